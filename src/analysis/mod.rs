@@ -93,11 +93,15 @@ fn analyze_part(
         let track = track::follow(batches, n_frames, &scene, params, scratch, progress)?;
         Ok::<_, Error>((scene, track))
     })?;
-    let lights: Vec<usize> = scene.plates.iter().map(|plate| plate.light).collect();
-    let plate = scene.plates.swap_remove(0);
+    let lights: Vec<usize> = scene
+        .backgrounds
+        .iter()
+        .map(|background| background.light)
+        .collect();
+    let background = scene.backgrounds.swap_remove(0);
     let occluders = match scene.is_masked {
         true => None,
-        false => occluders::take_out(&mut track, &plate, progress)?,
+        false => occluders::remove(&mut track, &background, progress)?,
     };
     let (view, view_confidence) = pose::view(&track.frames, params);
     let animal_too_small =
@@ -112,21 +116,21 @@ fn analyze_part(
         false => {
             let by_depth = params.scale_mode == ScaleMode::Depth && view == View::Side;
             let scales = by_depth.then(|| sprite::scales(&poses));
-            let is_in_light = |plate_idx: usize| lights[plate_idx] == lights[0];
+            let is_in_light = |background_idx: usize| lights[background_idx] == lights[0];
             sprite::align(&track, view, scales, is_in_light)
         }
     };
     let length_px = (view == View::Top)
         .then(|| stats::length_px(&poses))
         .flatten();
-    let shadow = length_px.and_then(|px| shadow::measure(&track, &plate.rgb, px));
-    let foreign = || track.frames.iter().filter(|t| t.plate_idx.is_none());
+    let shadow = length_px.and_then(|px| shadow::measure(&track, &background.rgb, px));
+    let foreign = || track.frames.iter().filter(|t| t.background_idx.is_none());
     let n_foreign_frames = foreign().count();
     let first_foreign_s = foreign().next().map(|t| t.time_s);
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
     let stats = LibraryStats {
-        never_seen_px: plate.never_seen_px,
+        never_seen_px: background.never_seen_px,
         several_animals: scene.several_animals,
         n_foreign_frames,
         first_foreign_s,
@@ -135,7 +139,7 @@ fn analyze_part(
     };
     Ok(Library {
         poses,
-        background: plate.rgb,
+        background: background.rgb,
         occluders,
         sprites,
         shadow,

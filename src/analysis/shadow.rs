@@ -1,60 +1,60 @@
 //! Measures the shadow of an animal seen from above: darkness, blur and offset.
 //!
-//! On the floor beside the animal, the background B loses the same share of light in all colors. The frame
+//! On the floor floor_cells the animal, the background B loses the same share of light in all colors. The frame
 //! shows I = B (1 - d m), where m is the animal's alpha, shifted away from the light and blurred. Shift and
 //! blur are the pair, of a small set, that explains most of B - I over many frames. The darkness d is the
 //! least-squares solution d = sum(B m (B - I)) / sum((B m)^2). Pixels that show the animal are left out. See
 //! docs/explanation/algorithms.md, "Shadows".
 
-use super::track::sighting::{Around, Sighting};
+use super::track::sighting::{Sighting, Surroundings};
 use super::track::{Track, Tracked};
 use crate::library::Shadow;
 use crate::order::median;
 use crate::raster::{RgbImage, RgbaImage};
 
 /// Least distance between two places of the animal that are used, body lengths. Free choice.
-const APART_BL: f64 = 0.5;
+const MIN_DISTANCE_BL: f64 = 0.5;
 /// Greatest number of places used. Free choice: it bounds the time.
-const MOST_PLACES: usize = 100;
+const MAX_PLACES: usize = 100;
 /// Least number of places. With fewer, a mirror image or moved bedding could be mistaken for a shadow. Free
 /// choice.
-const LEAST_PLACES: usize = 4;
+const MIN_PLACES: usize = 4;
 /// Square cells per body length. Cell means suffice, because shadows are soft. Free choice.
 const CELLS_PER_BL: f64 = 32.0;
 /// Greatest shift tried in each direction, cells. Free choice.
-const MOST_SHIFT: i32 = 8;
+const MAX_SHIFT: i32 = 8;
 /// Blurs tried: standard deviations of a Gaussian, cells. Free choice.
 const BLURS: [f64; 4] = [1.0, 2.0, 3.0, 4.5];
 /// Greatest share of a cell that the animal may cover; other cells and their neighbors are left out. Free
 /// choice.
-const CLEAR: f32 = 0.02;
+const MAX_COVERED: f32 = 0.02;
 /// Greatest distance of a cell from the animal, cells; farther ones may show other things. Free choice.
-const NEAR_CELLS: usize = 8;
+const MAX_DISTANCE_CELLS: usize = 8;
 /// Least brightness of a cell's background, as a share of that behind the animal. Darker cells are not on the
 /// same floor. Free choice.
-const LEAST_LIGHT: f32 = 0.65;
+const MIN_BRIGHTNESS: f32 = 0.65;
 /// Least darkness of a shadow, 0..=1. Free choice: less is noise or the blurred edge of the animal.
-const LEAST_DARKNESS: f64 = 0.05;
+const MIN_DARKNESS: f64 = 0.05;
 /// Least share of the squared differences around the animal that the shadow explains. Of the clips in
 /// docs/measurements.md, only the round arena exceeds it.
-const LEAST_EXPLAINED: f64 = 0.25;
+const MIN_EXPLAINED: f64 = 0.25;
 
 /// Returns the shadow of an animal of length `length_px` in front of the main background.
 ///
 /// `background` is the image of that background. Returns `None` when no shadow can be told from noise.
 pub fn measure(track: &Track, background: &RgbImage, length_px: f64) -> Option<Shadow> {
     let places = places(track, length_px);
-    if places.len() < LEAST_PLACES {
+    if places.len() < MIN_PLACES {
         return None;
     }
     let cell_px = (length_px / CELLS_PER_BL).max(1.0);
     let mut fit = Fit::default();
-    for (sighting, around) in places {
-        let mut pixels = RgbImage::new(around.rect.w, around.rect.h);
-        track.scratch.get(around.at, &mut pixels.pixels);
+    for (sighting, surroundings) in places {
+        let mut pixels = RgbImage::new(surroundings.rect.w, surroundings.rect.h);
+        track.scratch.get(surroundings.at, &mut pixels.pixels);
         let view = View {
             sighting,
-            around,
+            surroundings,
             seen: &pixels,
             matte: &track.image(sighting),
             background,
@@ -67,19 +67,23 @@ pub fn measure(track: &Track, background: &RgbImage, length_px: f64) -> Option<S
 /// Returns frames in which the animal is at distant places.
 ///
 /// A shadow follows the animal to all of them. A mirror image in a wall and moved bedding do not.
-fn places(track: &Track, length_px: f64) -> Vec<(&Sighting, Around)> {
-    let mut places: Vec<(&Sighting, Around)> = Vec::new();
-    for seen in track.frames.iter().filter_map(Tracked::before_main_plate) {
+fn places(track: &Track, length_px: f64) -> Vec<(&Sighting, Surroundings)> {
+    let mut places: Vec<(&Sighting, Surroundings)> = Vec::new();
+    for seen in track
+        .frames
+        .iter()
+        .filter_map(Tracked::before_main_background)
+    {
         let [x, y] = seen.moments.centroid_px;
-        let is_apart = |(other, _): &(&Sighting, Around)| {
+        let is_apart = |(other, _): &(&Sighting, Surroundings)| {
             let [u, v] = other.moments.centroid_px;
-            libm::hypot(x - u, y - v) >= APART_BL * length_px
+            libm::hypot(x - u, y - v) >= MIN_DISTANCE_BL * length_px
         };
-        if let Some(around) = seen.around
-            && places.len() < MOST_PLACES
+        if let Some(surroundings) = seen.surroundings
+            && places.len() < MAX_PLACES
             && places.iter().all(is_apart)
         {
-            places.push((seen, around));
+            places.push((seen, surroundings));
         }
     }
     places
@@ -88,7 +92,7 @@ fn places(track: &Track, length_px: f64) -> Vec<(&Sighting, Around)> {
 /// The surroundings of the animal in one frame.
 struct View<'a> {
     sighting: &'a Sighting,
-    around: Around,
+    surroundings: Surroundings,
     seen: &'a RgbImage,
     matte: &'a RgbaImage,
     background: &'a RgbImage,
@@ -110,7 +114,7 @@ struct Cells {
 
 impl View<'_> {
     fn cells(&self, cell_px: f64) -> Cells {
-        let rect = self.around.rect;
+        let rect = self.surroundings.rect;
         let n_cells = |px: u32| (f64::from(px) / cell_px).ceil() as usize;
         let (width, height) = (n_cells(rect.w), n_cells(rect.h));
         let mut sums = vec![[0.0f32; 8]; width * height];
@@ -143,9 +147,10 @@ impl View<'_> {
 
     fn alpha(&self, x: u32, y: u32) -> f32 {
         let rect = self.sighting.rect;
-        match rect.contains(x, y) {
-            true => f32::from(self.matte.pixel(x - rect.x, y - rect.y)[3]) / 255.0,
-            false => 0.0,
+        if rect.contains(x, y) {
+            f32::from(self.matte.pixel(x - rect.x, y - rect.y)[3]) / 255.0
+        } else {
+            0.0
         }
     }
 }
@@ -169,22 +174,22 @@ impl Default for Fit {
 }
 
 fn shifts() -> impl Iterator<Item = [i32; 2]> + Clone {
-    let along = || -MOST_SHIFT..=MOST_SHIFT;
+    let along = || -MAX_SHIFT..=MAX_SHIFT;
     along().flat_map(move |dy| along().map(move |dx| [dx, dy]))
 }
 
 impl Fit {
     fn add(&mut self, cells: &Cells) {
-        let beside = cells.beside();
+        let floor_cells = cells.floor_cells();
         let at = |[x, y]: [i32; 2]| y as usize * cells.width + x as usize;
         let squared = |&xy: &[i32; 2]| f64::from(cells.lost[at(xy)]).powi(2);
-        let weight = 1.0 / beside.iter().map(squared).sum::<f64>().max(1.0);
+        let weight = 1.0 / floor_cells.iter().map(squared).sum::<f64>().max(1.0);
         self.n_places += 1.0;
         let mut sums = self.sums.iter_mut();
         for sigma in BLURS {
             let blurred = cells.blurred(sigma);
             for ([dx, dy], sum) in shifts().zip(&mut sums) {
-                for &[x, y] in &beside {
+                for &[x, y] in &floor_cells {
                     let from = [x - dx, y - dy];
                     let is_in = (0..cells.width as i32).contains(&from[0])
                         && (0..cells.height as i32).contains(&from[1]);
@@ -207,9 +212,9 @@ impl Fit {
         let ((blur, shift), best) = (places.zip(&self.sums))
             .max_by(|(_, a), (_, b)| explained(**a).total_cmp(&explained(**b)))?;
         let darkness = (best[0] / best[1].max(1e-9)).min(1.0);
-        let is_one =
-            darkness >= LEAST_DARKNESS && explained(*best) >= LEAST_EXPLAINED * self.n_places;
-        is_one.then(|| Shadow {
+        let is_shadow =
+            darkness >= MIN_DARKNESS && explained(*best) >= MIN_EXPLAINED * self.n_places;
+        is_shadow.then(|| Shadow {
             darkness,
             offset_bl: shift.map(|cells| f64::from(cells) * cell_bl),
             blur_bl: blur * cell_bl,
@@ -218,18 +223,18 @@ impl Fit {
 }
 
 impl Cells {
-    /// Returns column and row of the cells beside the animal that show its floor.
+    /// Returns column and row of the cells floor_cells the animal that show its floor.
     ///
     /// Cells much darker than the background behind the animal are left out: a dark wall shows a mirror
     /// image.
-    fn beside(&self) -> Vec<[i32; 2]> {
-        let shows = |k: usize| self.alpha[k] > CLEAR;
+    fn floor_cells(&self) -> Vec<[i32; 2]> {
+        let shows = |k: usize| self.alpha[k] > MAX_COVERED;
         let behind = median(
             (0..self.alpha.len())
                 .filter(|&k| shows(k))
                 .map(|k| f64::from(self.back[k])),
         );
-        let least = LEAST_LIGHT * behind.unwrap_or(0.0) as f32;
+        let least = MIN_BRIGHTNESS * behind.unwrap_or(0.0) as f32;
         let is_near = |k: usize, reach: usize| {
             let (x, y) = (k % self.width, k / self.width);
             let columns = x.saturating_sub(reach)..(x + reach + 1).min(self.width);
@@ -238,7 +243,7 @@ impl Cells {
             all.any(|(x, y)| shows(y * self.width + x))
         };
         (0..self.alpha.len())
-            .filter(|&k| self.back[k] >= least && is_near(k, NEAR_CELLS) && !is_near(k, 1))
+            .filter(|&k| self.back[k] >= least && is_near(k, MAX_DISTANCE_CELLS) && !is_near(k, 1))
             .map(|k| [(k % self.width) as i32, (k / self.width) as i32])
             .collect()
     }
@@ -253,7 +258,7 @@ impl Cells {
             let (width, height) = (self.width as i32, self.height as i32);
             let mut result = Vec::with_capacity(from.len());
             for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
-                let of = |(k, weight): (i32, &f32)| {
+                let weighted = |(k, weight): (i32, &f32)| {
                     let (x, y) = (x + step[0] * k, y + step[1] * k);
                     let is_in = (0..width).contains(&x) && (0..height).contains(&y);
                     if is_in {
@@ -262,7 +267,7 @@ impl Cells {
                         0.0
                     }
                 };
-                result.push((-reach..).zip(&weights).map(of).sum::<f32>() / total);
+                result.push((-reach..).zip(&weights).map(weighted).sum::<f32>() / total);
             }
             result
         };
@@ -319,7 +324,7 @@ mod tests {
             let put = |bytes: &[u8]| scratch.put(bytes).expect("memory has room");
             let sighting = Sighting {
                 at: put(&matte.pixels),
-                around: Some(Around {
+                surroundings: Some(Surroundings {
                     rect: around,
                     at: put(&seen.pixels),
                 }),
@@ -327,7 +332,7 @@ mod tests {
             };
             Tracked {
                 time_s: f64::from(k),
-                plate_idx: Some(0),
+                background_idx: Some(0),
                 sighting: Some(sighting),
             }
         });
@@ -357,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shadow_is_measured_as_it_was_cast() {
+    fn cast_shadow_is_measured() {
         // Mean of the body over 11 x 11 pixels, 9 px to the right and 6 px up.
         let soft = |x: f64, y: f64| {
             let at = |k: i32| f64::from(k);
@@ -377,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn light_around_the_animal_and_a_thing_far_off_are_no_shadow() {
+    fn bright_rim_and_distant_object_are_no_shadow() {
         assert_eq!(measured(|_, _| 1.0), None);
         assert_eq!(
             measured(|x, y| if libm::hypot(x, y) < 36.0 { 1.1 } else { 1.0 }),

@@ -67,7 +67,7 @@ pub fn align(
     let size = common_size(&track.frames, view, &scale);
     let of = |t: &Tracked| {
         let sighting = t.sighting.as_ref()?;
-        t.plate_idx
+        t.background_idx
             .is_some_and(&is_in_light)
             .then(|| matte(sighting))
     };

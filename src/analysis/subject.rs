@@ -1,30 +1,28 @@
 //! Learns which moving thing is the animal: its size and color, from frames of the whole film.
 //!
 //! Each component of each sample frame is described by its [`Look`]. The [`Subject`] is the look that
-//! explains the most samples as one body. It occurs once per frame, moves about, differs clearly from the
-//! background and stays off the border. A hand, a plant, a shadow or a mirror image explains fewer samples or
-//! stays in place. The subject then scores the candidates of every frame.
+//! explains the most samples as one body. It occurs once per frame, moves about and differs clearly from the
+//! background. A hand, a plant, a shadow or a mirror image explains fewer samples or stays in place. The
+//! subject then scores the candidates of every frame.
 
 use crate::geometry::Rect;
 use crate::order;
 use crate::raster::RgbImage;
-use crate::raster::runs::Component;
+use crate::raster::runs::{Component, Run};
 
 /// Histogram bins of a color channel. Free choice.
 const N_BINS: usize = 16;
 /// Greatest number of pixels sampled from a component. Free choice: it bounds the time.
-const MOST_PX: u64 = 2048;
+const MAX_SAMPLED_PX: u64 = 2048;
 /// Standard deviation of one animal's color between frames, levels of 255. Free choice.
 const COLOR_SPREAD: f64 = 14.0;
 /// Standard deviation of log area between frames: a fish turned toward the camera covers a third. Free
 /// choice.
 const AREA_SPREAD: f64 = 0.45;
-/// Weight of the area's cost for a small component that the border may have cut. Free choice.
-const CUT_WEIGHT: f64 = 0.15;
 /// Cost below which a look fits the subject: two standard deviations, squared.
 pub const FITS: f64 = 4.0;
 /// Number of components per sample that are tried as the subject. Free choice.
-const SEEDS_EACH: usize = 3;
+const SEEDS_PER_SAMPLE: usize = 3;
 /// Least area of a component, pixels; smaller ones are noise. Free choice.
 pub const LEAST_AREA_PX: u64 = 12;
 
@@ -34,7 +32,7 @@ pub struct Color([[f32; N_BINS]; 3]);
 
 impl Color {
     /// Returns the color histogram of RGB pixels.
-    pub fn of<'a>(pixels: impl Iterator<Item = &'a [u8]>) -> Color {
+    pub fn from_pixels<'a>(pixels: impl Iterator<Item = &'a [u8]>) -> Color {
         let mut counts = [[0.0f32; N_BINS]; 3];
         let mut n = 0.0;
         for rgb in pixels {
@@ -57,15 +55,25 @@ impl Color {
         Color(counts)
     }
 
+    /// Returns the color histogram of a picture inside a component.
+    pub fn in_component(picture: &RgbImage, component: &Component) -> Color {
+        let row = |run: &Run| {
+            let first = run.y as usize * picture.width as usize;
+            let pixels = first + run.x0 as usize..first + run.x1 as usize;
+            picture.pixels[3 * pixels.start..3 * pixels.end].chunks(3)
+        };
+        Color::from_pixels(component.runs.iter().flat_map(row))
+    }
+
     /// Returns the earth mover's distance of two colors, as the mean over the channels, levels of 255.
     pub fn distance(&self, other: &Color) -> f64 {
-        let of = |(a, b): (&[f32; N_BINS], &[f32; N_BINS])| {
+        let channel = |(a, b): (&[f32; N_BINS], &[f32; N_BINS])| {
             a.iter()
                 .zip(b)
                 .map(|(a, b)| f64::from((a - b).abs()))
                 .sum::<f64>()
         };
-        let sum: f64 = self.0.iter().zip(&other.0).map(of).sum();
+        let sum: f64 = self.0.iter().zip(&other.0).map(channel).sum();
         sum * 255.0 / (N_BINS - 1) as f64 / 3.0
     }
 
@@ -107,7 +115,7 @@ pub struct Look {
 
 impl Look {
     /// Measures a component. `rgb` and `levels` (differences from the background) cover the component's box.
-    pub fn of(
+    pub fn measure(
         component: &Component,
         rgb: &RgbImage,
         levels: &[u8],
@@ -115,18 +123,18 @@ impl Look {
         light: usize,
     ) -> Look {
         let rect = component.rect;
-        let step = component.area.div_ceil(MOST_PX).max(1) as usize;
+        let step = component.area.div_ceil(MAX_SAMPLED_PX).max(1) as usize;
         let indices = || {
-            let of = move |run: &crate::raster::runs::Run| {
+            let indices_of = move |run: &Run| {
                 let row = (run.y - rect.y) as usize * rect.w as usize;
                 (run.x0 - rect.x) as usize + row..(run.x1 - rect.x) as usize + row
             };
-            component.runs.iter().flat_map(of).step_by(step)
+            component.runs.iter().flat_map(indices_of).step_by(step)
         };
         let n = indices().count().max(1) as f64;
         Look {
             area_px: component.area as f64,
-            color: Color::of(indices().map(|k| &rgb.pixels[3 * k..3 * k + 3])),
+            color: Color::from_pixels(indices().map(|k| &rgb.pixels[3 * k..3 * k + 3])),
             contrast: indices().map(|k| f64::from(levels[k])).sum::<f64>() / n,
             box_px: rect,
             centroid_px: component.centroid_px(),
@@ -170,7 +178,7 @@ impl Subject {
     /// `at` is a sample and the index of its component that is known to be the animal.
     pub fn learn(samples: &[Vec<Look>], at: Option<(usize, usize)>) -> Option<Subject> {
         let seed = match at {
-            Some((sample, component)) => Subject::like(&samples[sample][component]),
+            Some((sample, component)) => Subject::from_look(&samples[sample][component]),
             None => best_seed(samples)?,
         };
         let mut subject = seed;
@@ -181,7 +189,7 @@ impl Subject {
     }
 
     /// Returns the subject of a single look.
-    fn like(look: &Look) -> Subject {
+    fn from_look(look: &Look) -> Subject {
         Subject {
             colors: (0..=look.light)
                 .map(|light| (light == look.light).then(|| look.color.clone()))
@@ -217,14 +225,11 @@ impl Subject {
     pub fn cost(&self, look: &Look) -> f64 {
         let usual = self.color_in(look.light);
         let color = usual.map_or(0.0, |usual| usual.distance(&look.color)) / COLOR_SPREAD;
-        let area = self.area_cost(look.area_px);
-        // The border may cut off any part of the animal.
-        let is_part = look.on_border && look.area_px < self.area_px();
-        (if is_part { CUT_WEIGHT * area } else { area }) + color * color
+        self.area_cost(look.area_px) + color * color
     }
 
     /// Returns the part of the cost that comes from the area: 0 between the 5th and 95th percentile.
-    pub fn area_cost(&self, area_px: f64) -> f64 {
+    fn area_cost(&self, area_px: f64) -> f64 {
         let [low, _, high] = self.areas_px;
         let off = libm::log(area_px / area_px.clamp(low, high)) / AREA_SPREAD;
         off * off
@@ -276,11 +281,9 @@ impl Subject {
 
     /// Returns the score of the subject as an explanation of the samples.
     ///
-    /// It grows with the number of fitting samples, area, contrast and number of places. It falls with the
-    /// share of looks on the border and of shadows.
-    pub fn worth(&self, samples: &[Vec<Look>]) -> f64 {
+    /// It grows with the number of fitting samples, area, contrast and number of places.
+    pub fn score(&self, samples: &[Vec<Look>]) -> f64 {
         let members = self.members(samples);
-        let n = members.len() as f64;
         if members.is_empty() {
             return 0.0;
         }
@@ -295,13 +298,8 @@ impl Subject {
             .collect();
         places.sort_unstable();
         places.dedup();
-        let roams = (places.len() as f64 / n.clamp(1.0, 4.0)).min(1.0);
-        let share = |holds: &dyn Fn(&Look) -> bool| {
-            members.iter().filter(|look| holds(look)).count() as f64 / n
-        };
-        let inside = 1.0 - 0.7 * share(&|look| look.on_border);
-        let solid = 1.0 - 0.8 * share(&|look| look.is_shadow);
-        support * roams * inside * solid * self.area_px().sqrt() * self.contrast.max(1.0)
+        let roams = (places.len() as f64 / members.len().min(4) as f64).min(1.0);
+        support * roams * self.area_px().sqrt() * self.contrast.max(1.0)
     }
 }
 
@@ -312,16 +310,16 @@ fn best_seed(samples: &[Vec<Look>]) -> Option<Subject> {
             .filter(|&k| looks[k].may_be_animal())
             .collect();
         real.sort_by(|&a, &b| looks[b].area_px.total_cmp(&looks[a].area_px));
-        real.truncate(SEEDS_EACH);
+        real.truncate(SEEDS_PER_SAMPLE);
         real
     };
     let seeds = samples
         .iter()
         .flat_map(|looks| largest(looks).into_iter().map(|k| &looks[k]));
-    let with_worth = seeds
-        .map(Subject::like)
-        .map(|subject| (subject.worth(samples), subject));
-    let best = with_worth.max_by(|a, b| a.0.total_cmp(&b.0));
+    let scored = seeds
+        .map(Subject::from_look)
+        .map(|subject| (subject.score(samples), subject));
+    let best = scored.max_by(|a, b| a.0.total_cmp(&b.0));
     best.map(|(_, subject)| subject)
 }
 
@@ -342,7 +340,7 @@ mod tests {
         };
         Look {
             area_px: f64::from(side * side),
-            color: Color::of(std::iter::once(rgb.as_slice())),
+            color: Color::from_pixels(std::iter::once(rgb.as_slice())),
             contrast: 60.0,
             box_px,
             centroid_px: [f64::from(x), 80.0],
@@ -354,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_is_there_for_most_of_the_film_and_goes_places_is_the_subject() {
+    fn subject_is_seen_in_most_samples_and_moves_about() {
         let samples: Vec<Vec<Look>> = (0..40)
             .map(|k| match k {
                 0..8 => vec![look(SKIN, 90, 200, 0)],
@@ -370,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn in_another_light_the_subject_has_another_color() {
+    fn subject_has_a_color_for_each_light() {
         let samples: Vec<Vec<Look>> = (0..40)
             .map(|k| match k {
                 0..20 => vec![look(ORANGE, 30, 20 + 10 * k, 0)],

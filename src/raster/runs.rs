@@ -61,15 +61,6 @@ impl Component {
         let twice_area = 2.0 * self.area as f64;
         [twice_x as f64 / twice_area, twice_y as f64 / twice_area]
     }
-
-    /// Returns the union of two components.
-    pub fn joined(mut self, other: Component) -> Component {
-        self.runs.extend(other.runs);
-        self.runs.sort_by_key(|run| (run.y, run.x0));
-        self.area += other.area;
-        self.rect = self.rect.union(&other.rect);
-        self
-    }
 }
 
 /// Returns the components of a mask, ordered by their first pixel from the top left.

@@ -3,20 +3,20 @@
 //! Alpha is that of the mask. Where the footage mixes the colors of animal and background, the background's
 //! share is subtracted.
 
-use super::{Matte, NOWHERE, moved, nearest_set};
+use super::{Matte, NONE_NEAR, nearest_set, over_box};
 use crate::raster::{Frame, GivenMask, Mask, RgbaImage, runs};
 
 /// Least alpha that connects pixels, 0..=255; less is noise. Free choice.
-const TRACE: u8 = 4;
+const MIN_ALPHA: u8 = 4;
 /// Least alpha of a pixel that shows the animal only, 0..=255. Free choice.
-const SOLID: u8 = 250;
+const OPAQUE: u8 = 250;
 /// Squared alpha at which half of the color comes from the nearest pixel of the animal only. Free choice.
 ///
 /// The smaller the alpha, the less certain the color without the background.
-const DOUBT: f32 = 0.2;
+const HALF_TRUST: f32 = 0.2;
 /// Margin around the silhouette as a share of its longer side, for soft parts such as a clear fin. Free
 /// choice.
-const REACH: f64 = 0.25;
+const MARGIN: f64 = 0.25;
 
 /// Returns the matte of a silhouette with the given alpha, including all soft pixels connected to it.
 ///
@@ -24,15 +24,15 @@ const REACH: f64 = 0.25;
 /// the background may move.
 pub(super) fn pull(frame: &Frame, given: &GivenMask, silhouette: &Mask) -> Matte {
     let box_px = silhouette.rect;
-    let margin_px = (REACH * f64::from(box_px.w.max(box_px.h))).ceil() as u32 + 2;
+    let margin_px = (MARGIN * f64::from(box_px.w.max(box_px.h))).ceil() as u32 + 2;
     let rect = box_px.inflated(margin_px, frame.width, frame.height);
-    let silhouette = moved(silhouette, rect);
+    let silhouette = over_box(silhouette, rect);
     let columns = rect.w as usize;
     let alpha_at = |k: usize| {
         let (x, y) = (rect.x as usize + k % columns, rect.y as usize + k / columns);
         given.alpha[y * frame.width as usize + x]
     };
-    let near = hanging_together(&silhouette, alpha_at);
+    let near = connected_to(&silhouette, alpha_at);
     let rgb = frame.rgb(rect);
     let color_at = |k: usize| [0, 1, 2].map(|c| f32::from(rgb.pixels[3 * k + c]));
     let clear = Mask {
@@ -44,14 +44,17 @@ pub(super) fn pull(frame: &Frame, given: &GivenMask, silhouette: &Mask) -> Matte
     let solid = Mask {
         rect,
         bits: (0..near.bits.len())
-            .map(|k| near.bits[k] & u8::from(alpha_at(k) >= SOLID))
+            .map(|k| near.bits[k] & u8::from(alpha_at(k) >= OPAQUE))
             .collect(),
     };
-    let nearest = |mask: &Mask| match given.is_mixed {
-        true => nearest_set(mask, &near),
-        false => vec![NOWHERE; near.bits.len()],
+    let nearest = |mask: &Mask| {
+        if given.is_mixed {
+            nearest_set(mask, &near)
+        } else {
+            vec![NONE_NEAR; near.bits.len()]
+        }
     };
-    let (behind, beside) = (nearest(&clear), nearest(&solid));
+    let (nearest_clear, nearest_solid) = (nearest(&clear), nearest(&solid));
     let mut image = RgbaImage::new(rect.w, rect.h);
     for (k, rgba) in image.pixels.chunks_exact_mut(4).enumerate() {
         let level = alpha_at(k);
@@ -59,16 +62,16 @@ pub(super) fn pull(frame: &Frame, given: &GivenMask, silhouette: &Mask) -> Matte
             continue;
         }
         let (share, seen) = (f32::from(level) / 255.0, color_at(k));
-        let color = match behind[k] {
-            NOWHERE => seen,
+        let color = match nearest_clear[k] {
+            NONE_NEAR => seen,
             place => {
                 let back = color_at(place as usize);
                 let own = [0, 1, 2].map(|c| (seen[c] - (1.0 - share) * back[c]) / share);
-                match beside[k] {
-                    NOWHERE => own,
+                match nearest_solid[k] {
+                    NONE_NEAR => own,
                     solid => {
                         let (trust, solid) = (share * share, color_at(solid as usize));
-                        let trust = trust / (trust + DOUBT);
+                        let trust = trust / (trust + HALF_TRUST);
                         [0, 1, 2].map(|c| trust * own[c] + (1.0 - trust) * solid[c])
                     }
                 }
@@ -82,11 +85,11 @@ pub(super) fn pull(frame: &Frame, given: &GivenMask, silhouette: &Mask) -> Matte
 }
 
 /// Returns the pixels with alpha that are connected to the silhouette.
-fn hanging_together(silhouette: &Mask, alpha_at: impl Fn(usize) -> u8) -> Mask {
+fn connected_to(silhouette: &Mask, alpha_at: impl Fn(usize) -> u8) -> Mask {
     let soft = Mask {
         rect: silhouette.rect,
         bits: (0..silhouette.bits.len())
-            .map(|k| u8::from(alpha_at(k) >= TRACE))
+            .map(|k| u8::from(alpha_at(k) >= MIN_ALPHA))
             .collect(),
     };
     let mut near = Mask::new(silhouette.rect);

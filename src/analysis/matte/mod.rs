@@ -3,19 +3,17 @@
 //! Alpha is 1 inside the silhouette. In a band around the outline, alpha is the pixel's share of the way from
 //! the background's color to the animal's color nearby. The background's share is then subtracted from the
 //! color. Shadows are left out, because a sprite would turn them with the body; `shadow` measures them.
-//! Mirror images are left out too (`cast`).
 //!
 //! Values are encoded sRGB, as in the compositor. So a matte over its background reproduces the frame, except
-//! for shadows and mirror images. See docs/explanation/algorithms.md, "Mattes".
+//! for shadows. See docs/explanation/algorithms.md, "Mattes".
 
-mod cast;
+mod coat;
 mod given;
-mod solid;
+mod ground;
 
-use self::cast::Ground;
-use self::solid::Coat;
+use self::coat::Coat;
+use super::scene::background::Background;
 use super::scene::light::Light;
-use super::scene::plate::Plate;
 use super::silhouette::{self, Difference};
 use crate::geometry::Rect;
 use crate::raster::{Frame, Mask, RgbaImage};
@@ -35,7 +33,7 @@ pub struct Matte {
 /// pixels. When the frame has a given mask, its alpha is used.
 pub fn pull(
     frame: &Frame,
-    plate: &Plate,
+    background: &Background,
     light: &Light,
     silhouette: &Mask,
     length_px: f64,
@@ -47,27 +45,24 @@ pub fn pull(
     let rect = silhouette
         .rect
         .inflated(band_px + 1, frame.width, frame.height);
-    let difference = silhouette::difference(frame, plate, light, rect);
-    let mask = moved(silhouette, rect);
-    let on_ground = Ground::of(&mask, plate).on(&mask);
-    let coat_of = |mask: &Mask| Coat::of(mask, &difference, plate);
+    let difference = silhouette::difference(frame, background, light, rect);
+    let mask = over_box(silhouette, rect);
+    let on_ground = ground::part_on_ground(&mask, background);
+    let coat_of = |mask: &Mask| Coat::measure(mask, &difference, background);
     let coat = coat_of(&mask).or_starker(coat_of(&on_ground));
-    let mut solid = coat.without_halo(&mask, band_px);
-    let ground = Ground::of(&solid, plate);
-    let images = ground.clear_faded(&mut solid, &mask, &coat);
-    ground.clear_images(&mut solid, &images, &coat);
+    let solid = coat.without_halo(&mask, band_px);
     let inside = solid.eroded_by(band_px);
     let outer = mask.dilated_by(band_px);
-    let mut closed = solid.dilated_by(GAP_PX).eroded_by(GAP_PX);
-    closed.add(&solid);
-    let puller = Puller {
+    let mut without_gaps = solid.dilated_by(MAX_GAP_PX).eroded_by(MAX_GAP_PX);
+    without_gaps.add(&solid);
+    let puller = MattePuller {
         difference: &difference,
-        plate,
+        background,
         mask: &mask,
         solid: &solid,
         inside: &inside,
         broad: &solid.eroded().dilated_by(2),
-        closed: &closed,
+        without_gaps: &without_gaps,
         coat: &coat,
         nearest_inside: nearest_set(&inside, &outer),
         nearest_solid: nearest_set(&solid, &outer),
@@ -89,22 +84,22 @@ pub fn pull(
 }
 
 /// Returns the mask over another box, clear outside the old one.
-fn moved(mask: &Mask, rect: Rect) -> Mask {
+fn over_box(mask: &Mask, rect: Rect) -> Mask {
     let mut result = Mask::new(rect);
     result.add(mask);
     result
 }
 
 /// Marks a pixel without a known nearest set pixel.
-const NOWHERE: u32 = u32::MAX;
+const NONE_NEAR: u32 = u32::MAX;
 
 /// Returns for each pixel of `wanted` the index of the set pixel of `mask` that takes the fewest steps to
-/// reach (8-connected). All entries are [`NOWHERE`] when no pixel is set.
+/// reach (8-connected). All entries are [`NONE_NEAR`] when no pixel is set.
 ///
 /// A breadth-first search starts at the set pixels with a clear neighbor. It stops when all wanted pixels are
 /// reached. A border of pixels marked as reached keeps it inside the mask.
 fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
-    const BORDER: u32 = NOWHERE - 1;
+    const BORDER: u32 = NONE_NEAR - 1;
     let (w, h) = (mask.width(), mask.height());
     let padded = w + 2;
     let inner = mask.eroded();
@@ -116,7 +111,7 @@ fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
         for x in 0..w {
             let (k, at) = (y * w + x, (y + 1) * padded + x + 1);
             let is_set = mask.bits[k] == 1;
-            nearest[at] = if is_set { k as u32 } else { NOWHERE };
+            nearest[at] = if is_set { k as u32 } else { NONE_NEAR };
             is_wanted[at] = wanted.bits[k];
             n_left += usize::from(!is_set && wanted.bits[k] == 1);
             if is_set && inner.bits[k] == 0 {
@@ -128,7 +123,7 @@ fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
         for &at in &front {
             for first in [at - padded - 1, at - 1, at + padded - 1] {
                 for other in first..first + 3 {
-                    if nearest[other] == NOWHERE {
+                    if nearest[other] == NONE_NEAR {
                         nearest[other] = nearest[at];
                         n_left -= usize::from(is_wanted[other]);
                         next.push(other);
@@ -143,22 +138,20 @@ fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
     rows.flat_map(|row| row[1..=w].iter().copied()).collect()
 }
 
-/// Alpha below this value is noise, 0..=1. Free choice.
-const TRACE: f32 = 0.04;
 /// Half the width of gaps in the silhouette that count as narrow, pixels. A wire across the animal leaves
 /// one.
-const GAP_PX: u32 = 2;
+const MAX_GAP_PX: u32 = 2;
 /// Properties of the animal near a pixel of the band.
-struct Nearby {
+struct NearbyAnimal {
     /// The animal's color, levels of 255.
     color: [f32; 3],
     /// Whether the pixel has the background's color with less light.
     is_shadow: bool,
 }
 
-struct Puller<'a> {
+struct MattePuller<'a> {
     difference: &'a Difference,
-    plate: &'a Plate,
+    background: &'a Background,
     mask: &'a Mask,
     /// The silhouette without the shadow around it.
     solid: &'a Mask,
@@ -167,70 +160,67 @@ struct Puller<'a> {
     /// The solid part where it is at least 3 pixels broad, and the pixels next to it.
     broad: &'a Mask,
     /// The solid part with its narrow gaps closed.
-    closed: &'a Mask,
+    without_gaps: &'a Mask,
     coat: &'a Coat<'a>,
-    /// Index of an inside pixel near each pixel, or [`NOWHERE`].
+    /// Index of an inside pixel near each pixel, or [`NONE_NEAR`].
     nearest_inside: Vec<u32>,
-    /// Index of a solid pixel near each pixel, or [`NOWHERE`].
+    /// Index of a solid pixel near each pixel, or [`NONE_NEAR`].
     nearest_solid: Vec<u32>,
     band_px: u32,
 }
 
-impl Puller<'_> {
+impl MattePuller<'_> {
     fn frame_color(&self, k: usize) -> [u8; 3] {
         let rgb = &self.difference.rgb.pixels[3 * k..3 * k + 3];
         [rgb[0], rgb[1], rgb[2]]
     }
 
     /// Returns the index of a pixel in the background image.
-    fn place(&self, k: usize) -> usize {
-        let (rect, width) = (self.mask.rect, self.mask.width());
-        let (x, y) = (rect.x as usize + k % width, rect.y as usize + k / width);
-        y * self.plate.frame.width as usize + x
+    fn background_px(&self, k: usize) -> usize {
+        self.background.px_in(self.mask.rect, k)
     }
 
-    fn plate_color(&self, k: usize) -> [f32; 3] {
-        let at = 3 * self.place(k);
-        [0, 1, 2].map(|c| f32::from(self.plate.rgb.pixels[at + c]))
+    fn background_color(&self, k: usize) -> [f32; 3] {
+        self.background.color(self.background_px(k))
     }
 
     /// Returns the straight color and the alpha of a pixel of the band.
     fn band_pixel(&self, k: usize) -> [u8; 4] {
-        let Some(Nearby { color, is_shadow }) = self.nearby(k) else {
+        let Some(NearbyAnimal { color, is_shadow }) = self.nearby(k) else {
             return [0; 4];
         };
-        let most = if is_shadow {
+        let max_alpha = if is_shadow {
             self.blurred_solid(k)
         } else {
             1.0
         };
         let alpha = self
-            .toward(color, k)
-            .unwrap_or_else(|| self.alike(k))
-            .min(most);
-        let alpha = match self.core(k) {
-            Some(core) if !is_shadow => self.thinned(alpha, core, k),
+            .alpha_by_color(color, k)
+            .unwrap_or_else(|| self.alpha_without_contrast(k))
+            .min(max_alpha);
+        let alpha = match self.thin_part_color(k) {
+            Some(body) if !is_shadow => self.alpha_of_thin_part(alpha, body, k),
             _ => alpha,
         };
-        if alpha < TRACE {
+        let level = (alpha * 255.0 + 0.5) as u8;
+        if level == 0 {
             return [0; 4];
         }
-        let color = match !is_shadow && alpha <= 0.2 {
-            true => color,
-            false => {
-                let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
-                [0, 1, 2].map(|c| ((seen[c] - (1.0 - alpha) * back[c]) / alpha).clamp(0.0, 255.0))
-            }
+        let color = if !is_shadow && alpha <= 0.2 {
+            color
+        } else {
+            let (back, seen) = (self.background_color(k), self.frame_color(k).map(f32::from));
+            [0, 1, 2].map(|c| ((seen[c] - (1.0 - alpha) * back[c]) / alpha).clamp(0.0, 255.0))
         };
         let [r, g, b] = color.map(|c| (c + 0.5) as u8);
-        [r, g, b, (alpha * 255.0 + 0.5) as u8]
+        [r, g, b, level]
     }
 
     /// Returns the color of the nearest inside pixels for a part at most 2 pixels broad; `None` for broader
     /// parts.
-    fn core(&self, k: usize) -> Option<[f32; 3]> {
+    fn thin_part_color(&self, k: usize) -> Option<[f32; 3]> {
         let inside = self.nearest_inside[k];
-        (inside != NOWHERE && self.broad.bits[k] == 0).then(|| self.mean_inside(inside as usize))
+        (inside != NONE_NEAR && self.broad.bits[k] == 0).then(|| self.mean_inside(inside as usize))
     }
 
     /// Returns the alpha of a pixel of a thin part, such as a tail far away.
@@ -238,10 +228,10 @@ impl Puller<'_> {
     /// A pixel between the colors of background and body is a mixture, because the part does not fill it. Its
     /// alpha is then the body's share, but at least 0.5 to keep the part within its outline. The resulting
     /// color is near the body's, so the part does not shine on a dark background.
-    fn thinned(&self, alpha: f32, core: [f32; 3], k: usize) -> f32 {
-        let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
-        let explained = self.toward(core, k).filter(|&share| {
-            let off = [0, 1, 2].map(|c| seen[c] - back[c] - share * (core[c] - back[c]));
+    fn alpha_of_thin_part(&self, alpha: f32, body: [f32; 3], k: usize) -> f32 {
+        let (back, seen) = (self.background_color(k), self.frame_color(k).map(f32::from));
+        let explained = self.alpha_by_color(body, k).filter(|&share| {
+            let off = [0, 1, 2].map(|c| seen[c] - back[c] - share * (body[c] - back[c]));
             dot(off, off) < self.noise_squared(k)
         });
         explained.map_or(alpha, |share| share.max(0.5).min(alpha))
@@ -250,8 +240,8 @@ impl Puller<'_> {
     /// Returns the share of the way from the background's color to `fore`, 0..=1.
     ///
     /// Returns `None` when the two colors differ by less than three standard deviations of the noise.
-    fn toward(&self, fore: [f32; 3], k: usize) -> Option<f32> {
-        let (back, seen) = (self.plate_color(k), self.frame_color(k).map(f32::from));
+    fn alpha_by_color(&self, fore: [f32; 3], k: usize) -> Option<f32> {
+        let (back, seen) = (self.background_color(k), self.frame_color(k).map(f32::from));
         let (span, seen_span) = (minus(fore, back), minus(seen, back));
         let is_distinct = dot(span, span) >= self.noise_squared(k);
         is_distinct.then(|| (dot(seen_span, span) / dot(span, span)).clamp(0.0, 1.0))
@@ -261,35 +251,37 @@ impl Puller<'_> {
     ///
     /// A pixel that differs from the background is opaque: a share of a small color difference would
     /// exaggerate it.
-    fn alike(&self, k: usize) -> f32 {
-        let off = minus(self.frame_color(k).map(f32::from), self.plate_color(k));
-        match dot(off, off) < self.noise_squared(k) {
-            true => self.blurred_solid(k),
-            false => 1.0,
+    fn alpha_without_contrast(&self, k: usize) -> f32 {
+        let off = minus(self.frame_color(k).map(f32::from), self.background_color(k));
+        if dot(off, off) < self.noise_squared(k) {
+            self.blurred_solid(k)
+        } else {
+            1.0
         }
     }
 
     fn noise_squared(&self, k: usize) -> f32 {
-        (3.0 * self.plate.sigma[self.place(k)]).powi(2)
+        (3.0 * self.background.sigma[self.background_px(k)]).powi(2)
     }
 
     /// Returns the animal's color near a pixel of the band; `None` outside the band.
     ///
     /// Pixels in narrow gaps of the animal never count as shadow.
-    fn nearby(&self, k: usize) -> Option<Nearby> {
+    fn nearby(&self, k: usize) -> Option<NearbyAnimal> {
         let band = self.band_px as usize;
         let solid = self.nearest_solid[k];
-        if solid == NOWHERE || self.steps(k, solid as usize) > band {
+        if solid == NONE_NEAR || self.steps(k, solid as usize) > band {
             return None;
         }
         let inside = self.nearest_inside[k];
-        let color = match inside != NOWHERE && self.steps(k, inside as usize) <= 2 * band + 1 {
-            true => self.mean_inside(inside as usize),
-            false => self.starkest(solid as usize)?,
+        let color = if inside != NONE_NEAR && self.steps(k, inside as usize) <= 2 * band + 1 {
+            self.mean_inside(inside as usize)
+        } else {
+            self.starkest(solid as usize)?
         };
-        Some(Nearby {
+        Some(NearbyAnimal {
             color,
-            is_shadow: self.closed.bits[k] == 0 && self.coat.is_shadow(k),
+            is_shadow: self.without_gaps.bits[k] == 0 && self.coat.is_shadow(k),
         })
     }
 

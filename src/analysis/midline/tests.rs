@@ -74,7 +74,7 @@ impl Sausage {
             upright_px: f64::from(rect.h),
             box_px: rect,
             cut: false,
-            around: None,
+            surroundings: None,
         };
         (sighting, image)
     }
@@ -153,7 +153,7 @@ fn track(sausage: &Sausage) -> Track {
     let sighting = Some(sighting);
     let frames = vec![Tracked {
         time_s: 0.0,
-        plate_idx: Some(0),
+        background_idx: Some(0),
         sighting,
     }];
     Track {

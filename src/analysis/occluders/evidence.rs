@@ -13,20 +13,20 @@ use crate::progress::Progress;
 use crate::raster::{Mask, RgbImage, RgbaImage};
 
 /// Least number of the ring's 72 pixels that must show the animal and no occluder. Free choice: a third.
-const LEAST_RING: i64 = 24;
+const MIN_RING_PX: i64 = 24;
 /// Matte pixels read into memory at a time, but at least one frame. Free choice.
 const BATCH_PX: u64 = 1 << 20;
 /// Fractions per level in ring means: fixed-point sixteenths keep the sums exact.
-const PARTS: i64 = 16;
+const STEPS_PER_LEVEL: i64 = 16;
 
 /// Conditions under which a pixel counts as an occluder.
-pub(super) struct Proof {
+pub(super) struct Criteria {
     /// Least share of the pixel, 0..=1, after subtraction of the share that a line behind the animal would
     /// imitate.
     pub(super) share: f64,
     /// Whether the background must have a line or speck there, whose contrast is opposite to that of the
     /// animal.
-    pub(super) is_in_plate: bool,
+    pub(super) needs_line: bool,
     /// Greatest ratio of the squared residual with the occluder to that without it.
     pub(super) unexplained: f64,
     /// Least gain per frame: decrease of the squared residual per channel, squared levels.
@@ -35,7 +35,7 @@ pub(super) struct Proof {
     pub(super) gain_of_all: f64,
 }
 
-/// Evidence at one pixel: sums over frames and channels, of levels times [`PARTS`].
+/// Evidence at one pixel: sums over frames and channels, of levels times [`STEPS_PER_LEVEL`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Evidence {
     n_frames: i64,
@@ -70,38 +70,38 @@ impl Evidence {
         (1.0 - self.both as f64 / around).clamp(0.0, 1.0)
     }
 
-    /// Returns whether the evidence meets all conditions of `proof`.
-    pub(super) fn is(&self, proof: &Proof) -> bool {
+    /// Returns whether the evidence meets all conditions of `criteria`.
+    pub(super) fn meets(&self, criteria: &Criteria) -> bool {
         let share = self.share();
-        let through = 1.0 - share;
-        let left = self.here as f64 - 2.0 * through * self.both as f64
-            + through * through * self.around as f64;
+        let transmitted = 1.0 - share;
+        let residual = self.here as f64 - 2.0 * transmitted * self.both as f64
+            + transmitted * transmitted * self.around as f64;
         let unlike = self.unlike as f64;
         // Share that a line behind an opaque animal would imitate (I = A). A line seen through the animal
         // gives less.
-        let feigned = (self.toward as f64 / self.around.max(1) as f64).max(0.0);
-        let is_in_plate = self.alike > 0 && self.toward < 0;
-        let gain = (unlike - left) / (3 * PARTS * PARTS) as f64;
-        let is_seen = gain > proof.gain_of_all && gain > proof.gain * self.n_frames as f64;
-        left < proof.unexplained * unlike
+        let imitated_share = (self.toward as f64 / self.around.max(1) as f64).max(0.0);
+        let needs_line = self.alike > 0 && self.toward < 0;
+        let gain = (unlike - residual) / (3 * STEPS_PER_LEVEL * STEPS_PER_LEVEL) as f64;
+        let is_seen = gain > criteria.gain_of_all && gain > criteria.gain * self.n_frames as f64;
+        residual < criteria.unexplained * unlike
             && is_seen
-            && share - feigned >= proof.share
-            && (is_in_plate || !proof.is_in_plate)
+            && share - imitated_share >= criteria.share
+            && (needs_line || !criteria.needs_line)
     }
 }
 
 /// The inputs that are common to all pixels of a box.
-pub(super) struct Question<'a> {
-    pub(super) plate: &'a RgbImage,
+pub(super) struct EvidenceInput<'a> {
+    pub(super) background: &'a RgbImage,
     /// Pixels of the box that are already known to show an occluder. Rings leave them out.
     pub(super) found: &'a Mask,
 }
 
-impl Question<'_> {
+impl EvidenceInput<'_> {
     /// Returns the evidence of all sightings, as pairs of pixel index in the box and sums over the frames.
     ///
     /// The order does not depend on the number of threads. Fails with `Cancelled` when `progress` says so.
-    pub(super) fn answer(
+    pub(super) fn collect(
         &self,
         track: &Track,
         sightings: &[Sighting],
@@ -141,20 +141,24 @@ impl Question<'_> {
         };
         let is_inside = |k: usize| matte.pixels[4 * k + 3] == 255;
         let is_known = |k: usize| i32::from(is_inside(k) && self.found.bits[index(k)] == 0);
-        let plate = |k: usize, c: usize| {
+        let background = |k: usize, c: usize| {
             let [x, y] = place(k);
-            self.plate.pixels[(y as usize * self.plate.width as usize + x as usize) * 3 + c]
+            self.background.pixels
+                [(y as usize * self.background.width as usize + x as usize) * 3 + c]
         };
-        let n = SummedArea::of(rect, is_known);
+        let n = SummedArea::new(rect, is_known);
         let channels: [_; 3] = std::array::from_fn(|c| {
             let frame = |k: usize| is_known(k) * i32::from(matte.pixels[4 * k + c]);
-            let plate = |k: usize| is_known(k) * i32::from(plate(k, c));
-            [SummedArea::of(rect, frame), SummedArea::of(rect, plate)]
+            let background = |k: usize| is_known(k) * i32::from(background(k, c));
+            [
+                SummedArea::new(rect, frame),
+                SummedArea::new(rect, background),
+            ]
         });
         let of_pixel = |k: usize| {
             let (x, y) = (k % columns, k / columns);
             let n = i64::from(n.ring(x, y));
-            if n < LEAST_RING {
+            if n < MIN_RING_PX {
                 return None;
             }
             let mut evidence = Evidence {
@@ -162,10 +166,11 @@ impl Question<'_> {
                 ..Evidence::default()
             };
             for (c, sums) in channels.iter().enumerate() {
-                let mean = |sums: &SummedArea| (PARTS * i64::from(sums.ring(x, y)) + n / 2) / n;
+                let mean =
+                    |sums: &SummedArea| (STEPS_PER_LEVEL * i64::from(sums.ring(x, y)) + n / 2) / n;
                 let [animal, scene] = [mean(&sums[0]), mean(&sums[1])];
-                let seen = PARTS * i64::from(matte.pixels[4 * k + c]);
-                let back = PARTS * i64::from(plate(k, c));
+                let seen = STEPS_PER_LEVEL * i64::from(matte.pixels[4 * k + c]);
+                let back = STEPS_PER_LEVEL * i64::from(background(k, c));
                 evidence.both += (seen - back) * (animal - scene);
                 evidence.around += (animal - scene).pow(2);
                 evidence.here += (seen - back).pow(2);

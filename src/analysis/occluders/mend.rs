@@ -15,20 +15,20 @@ use crate::scratch::{Full, Scratch};
 
 /// Greatest alpha of an occluder that is subtracted, 0..=255. Free choice: beyond a half, noise would
 /// dominate.
-const MOST_TAKEN_AWAY: u8 = 128;
+const MAX_SUBTRACTED: u8 = 128;
 
 /// Mends every matte that overlaps an occluder, and measures its sighting again.
 ///
 /// Only mattes in front of the main background are mended. Fails when the scratch is full, and with
 /// `Cancelled`.
-pub(super) fn mend(
+pub(super) fn mend_mattes(
     track: &mut Track,
     occluders: &RgbaImage,
     progress: &dyn Progress,
 ) -> Result<(), Error> {
     let scratch = track.scratch.clone();
     track.frames.par_iter_mut().try_for_each(|tracked| {
-        let Some(seen) = tracked.before_main_plate() else {
+        let Some(seen) = tracked.before_main_background() else {
             return Ok(());
         };
         if progress.cancelled() {
@@ -70,10 +70,11 @@ fn fill(image: &mut RgbaImage, occluder: impl Fn(usize, usize) -> [u8; 4]) -> bo
     let mut filled = Vec::new();
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
         if is_found(x, y) {
-            let (old, before) = (image.pixel(x as u32, y as u32), occluder(x, y));
-            let new = match old[3] == 255 && before[3] <= MOST_TAKEN_AWAY {
-                true => without(old, before),
-                false => around(image, [x, y], &is_found),
+            let (old, occluder_rgba) = (image.pixel(x as u32, y as u32), occluder(x, y));
+            let new = if old[3] == 255 && occluder_rgba[3] <= MAX_SUBTRACTED {
+                unoccluded(old, occluder_rgba)
+            } else {
+                mean_around(image, [x, y], &is_found)
             };
             filled.push((y * width + x, new));
         }
@@ -88,17 +89,17 @@ fn fill(image: &mut RgbaImage, occluder: impl Fn(usize, usize) -> [u8; 4]) -> bo
 }
 
 /// Returns the animal's color A = (I - w F) / (1 - w), opaque.
-fn without(seen: [u8; 4], before: [u8; 4]) -> [u8; 4] {
-    let share = f64::from(before[3]) / 255.0;
+fn unoccluded(seen: [u8; 4], occluder_rgba: [u8; 4]) -> [u8; 4] {
+    let share = f64::from(occluder_rgba[3]) / 255.0;
     let own = |c: usize| {
-        let left = f64::from(seen[c]) - share * f64::from(before[c]);
+        let left = f64::from(seen[c]) - share * f64::from(occluder_rgba[c]);
         (left / (1.0 - share)).round() as u8
     };
     [own(0), own(1), own(2), 255]
 }
 
 /// Returns the mean around a pixel without occluded pixels, weighted by 1 / distance^4 to keep edges sharp.
-fn around(
+fn mean_around(
     image: &RgbaImage,
     [x, y]: [usize; 2],
     is_found: &impl Fn(usize, usize) -> bool,

@@ -18,7 +18,7 @@ pub(super) struct SummedArea {
 
 impl SummedArea {
     /// Builds the table of a plane of the size of `rect`, with `value(k)` at index k.
-    pub(super) fn of(rect: Rect, value: impl Fn(usize) -> i32) -> SummedArea {
+    pub(super) fn new(rect: Rect, value: impl Fn(usize) -> i32) -> SummedArea {
         let (width, height) = (rect.w as usize, rect.h as usize);
         let mut sums = vec![0i32; (width + 1) * (height + 1)];
         for y in 0..height {
@@ -38,11 +38,11 @@ impl SummedArea {
 
     /// Returns the sum over the ring around a pixel. Pixels beyond the plane count as 0.
     pub(super) fn ring(&self, x: usize, y: usize) -> i32 {
-        self.around(x, y, OUTER_PX)
-            .wrapping_sub(self.around(x, y, INNER_PX))
+        self.square(x, y, OUTER_PX)
+            .wrapping_sub(self.square(x, y, INNER_PX))
     }
 
-    fn around(&self, x: usize, y: usize, reach: usize) -> i32 {
+    fn square(&self, x: usize, y: usize, reach: usize) -> i32 {
         let (left, top) = (x.saturating_sub(reach), y.saturating_sub(reach));
         let right = (x + reach + 1).min(self.width);
         let bottom = (y + reach + 1).min(self.height);
@@ -59,10 +59,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_ring_is_what_is_near_but_not_beside() {
+    fn ring_sums_near_pixels_without_the_center() {
         let rect = Rect::of_size(13, 11);
         let value = |k: usize| (k as i32 * 7919) % 511 - 255;
-        let plane = SummedArea::of(rect, value);
+        let plane = SummedArea::new(rect, value);
         for (x, y) in [(0, 0), (6, 5), (12, 10), (2, 9)] {
             let mut wanted = 0;
             for (u, v) in (0..11usize).flat_map(|v| (0..13usize).map(move |u| (u, v))) {

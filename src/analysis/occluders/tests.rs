@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::analysis::scene::plate::Plate;
+use crate::analysis::scene::background::Background;
 use crate::analysis::track::{self, Track};
 use crate::analysis::{Params, occluders, read_ahead, scene};
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
@@ -49,10 +49,10 @@ fn wall(x: u32) -> f64 {
 }
 
 fn center_px(frame_idx: usize) -> [f64; 2] {
-    let way = frame_idx as f64 * 0.21;
+    let phase = frame_idx as f64 * 0.21;
     [
-        96.0 + 70.0 * libm::sin(way),
-        48.0 + 12.0 * libm::sin(2.3 * way),
+        96.0 + 70.0 * libm::sin(phase),
+        48.0 + 12.0 * libm::sin(2.3 * phase),
     ]
 }
 
@@ -77,7 +77,7 @@ impl Film {
     }
 
     /// Returns the track of the film, its background and the occluders found.
-    fn looked_at(&self) -> (Track, Plate, Option<RgbaImage>) {
+    fn analyzed(&self) -> (Track, Background, Option<RgbaImage>) {
         let params = Params::default();
         let scratch: Arc<dyn Scratch> = Arc::new(InMemory::default());
         let (mut scene, mut track) = read_ahead::while_reading(self, |batches| {
@@ -86,9 +86,9 @@ impl Film {
             Ok::<_, crate::analysis::Error>((scene, track))
         })
         .expect("a disc that moves");
-        let plate = scene.plates.swap_remove(0);
-        let found = occluders::take_out(&mut track, &plate, &Silent).expect("not cancelled");
-        (track, plate, found)
+        let background = scene.backgrounds.swap_remove(0);
+        let found = occluders::remove(&mut track, &background, &Silent).expect("not cancelled");
+        (track, background, found)
     }
 }
 
@@ -130,12 +130,12 @@ impl FrameStream for Reel<'_> {
 }
 
 #[test]
-fn wires_before_the_animal_are_found_and_bars_behind_it_are_not() {
+fn wires_in_front_are_found_and_bars_behind_are_not() {
     let film = Film {
         wires: two_wires,
         clear: 0.0,
     };
-    let (_, plate, found) = film.looked_at();
+    let (_, background, found) = film.analyzed();
     let found = found.expect("two wires");
     let (mut n_right, mut n_wire, mut n_wrong) = (0, 0, 0);
     // Rows and columns that the whole disc crosses.
@@ -145,27 +145,26 @@ fn wires_before_the_animal_are_found_and_bars_behind_it_are_not() {
         // Shares are less accurate where a wire crosses a bar.
         let is_wire = share > 0.0 && wall(x) == 150.0;
         n_wire += usize::from(is_wire);
-        match share > 0.0 {
-            true => {
-                let is_right = (alpha / 255.0 - share).abs() < 0.12
-                    && [r, g, b].iter().all(|own| (own - level).abs() < 35.0);
-                n_right += usize::from(is_wire && is_right);
-            }
-            false => n_wrong += usize::from(alpha > 0.0),
+        if share > 0.0 {
+            let is_right = (alpha / 255.0 - share).abs() < 0.12
+                && [r, g, b].iter().all(|own| (own - level).abs() < 35.0);
+            n_right += usize::from(is_wire && is_right);
+        } else {
+            n_wrong += usize::from(alpha > 0.0);
         }
     }
     assert!(10 * n_right >= 9 * n_wire, "{n_right} of {n_wire}");
     assert!(n_wrong <= n_wire / 50, "{n_wrong} beside {n_wire}");
-    assert_eq!(plate.rgb.width, found.width);
+    assert_eq!(background.rgb.width, found.width);
 }
 
 #[test]
-fn mattes_are_the_animal_as_if_nothing_had_been_before_it() {
+fn mattes_show_the_animal_without_the_wires() {
     let film = Film {
         wires: two_wires,
         clear: 0.0,
     };
-    let (track, _, _) = film.looked_at();
+    let (track, _, _) = film.analyzed();
     let (mut off, mut n, mut n_torn) = (0.0, 0.0, 0);
     for (frame_idx, tracked) in track.frames.iter().enumerate() {
         let seen = tracked.sighting.as_ref().expect("always in the picture");
@@ -191,10 +190,10 @@ fn mattes_are_the_animal_as_if_nothing_had_been_before_it() {
 }
 
 #[test]
-fn nothing_is_found_before_an_animal_in_the_open_nor_behind_one_that_is_seen_through() {
+fn nothing_is_found_without_wires() {
     for clear in [0.0, 0.5] {
         let film = Film { wires: none, clear };
-        let (track, _, found) = film.looked_at();
+        let (track, _, found) = film.analyzed();
         let area = found.map_or(0, |image| {
             image.pixels.chunks(4).filter(|p| p[3] > 0).count()
         });

@@ -42,7 +42,7 @@ pub(super) fn fish(frame_idx: usize, look: Look) -> Tracked {
     };
     Tracked {
         time_s: frame_idx as f64 / 30.0,
-        plate_idx: Some(0),
+        background_idx: Some(0),
         sighting: Sighting::measured(rect, &matte),
     }
 }

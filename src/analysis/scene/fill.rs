@@ -3,10 +3,10 @@
 //! non-parametric sampling", 1999.
 //!
 //! Each pixel, from the rim of the hole inward, copies the color of a nearby place with similar known
-//! surroundings. The search compares all places within `SURROUND_PX` in integer arithmetic.
+//! surroundings. The search compares all places within `SEARCH_PX` in integer arithmetic.
 //!
 //! Two parts differ from the paper on purpose. There is no limit on the error of a match, because every pixel
-//! needs a color. Beyond [`MOST_SAMPLED_PX`] pixels [`smooth`] fills the rest: so large a hole is an unseen
+//! needs a color. Beyond [`MAX_SAMPLED_PX`] pixels [`smooth`] fills the rest: so large a hole is an unseen
 //! part of the scene, not a gap in a texture.
 
 use rayon::prelude::*;
@@ -18,23 +18,23 @@ use crate::raster::{Mask, RgbImage};
 /// Half side of the 7 x 7 window of surroundings that is compared, pixels.
 const RADIUS: i64 = 3;
 /// Largest distance of a copied place from the rim of the hole along x and y, pixels. Free choice.
-const SURROUND_PX: i64 = 64;
+const SEARCH_PX: i64 = 64;
 /// Largest error of an eligible match relative to the best one, as a fraction: the paper's epsilon.
 const TOLERANCE: [u64; 2] = [11, 10];
 /// Gaussian weights for offsets 0 to 3 (standard deviation 7 / 6.4 pixels, from the paper). They are scaled
 /// so that the sum over a window of three channels fits 32 bits.
 const WEIGHTS: [u32; 4] = [52, 34, 10, 1];
 /// Largest number of pixels filled with texture. Free choice.
-pub(super) const MOST_SAMPLED_PX: usize = 16_384;
+pub(super) const MAX_SAMPLED_PX: usize = 16_384;
 
 /// Replaces the pixels marked unknown by texture. Equal seeds give equal bytes. Leaves the image unchanged if
 /// no pixel is known.
 pub(super) fn sample_texture(image: &mut RgbImage, unknown: &[bool], seed: u64) {
-    let mut hole = Hole::of(image, unknown);
+    let mut hole = Hole::new(image, unknown);
     let mut n_sampled = 0;
     let mut rim = hole.rim();
-    while !rim.is_empty() && n_sampled < MOST_SAMPLED_PX {
-        for &px in rim.iter().take(MOST_SAMPLED_PX - n_sampled) {
+    while !rim.is_empty() && n_sampled < MAX_SAMPLED_PX {
+        for &px in rim.iter().take(MAX_SAMPLED_PX - n_sampled) {
             if let Some(from) = hole.choose(px, seed) {
                 let color = [0, 1, 2].map(|c| hole.image.pixels[3 * from + c]);
                 hole.image.pixels[3 * px..3 * px + 3].copy_from_slice(&color);
@@ -66,7 +66,7 @@ struct Hole<'a> {
 }
 
 /// One known pixel in the window around an unknown pixel.
-struct Around {
+struct KnownPixel {
     dx: i64,
     dy: i64,
     weight: u32,
@@ -74,7 +74,7 @@ struct Around {
 }
 
 impl<'a> Hole<'a> {
-    fn of(image: &'a mut RgbImage, unknown: &[bool]) -> Hole<'a> {
+    fn new(image: &'a mut RgbImage, unknown: &[bool]) -> Hole<'a> {
         let known = Mask {
             rect: Rect::of_size(image.width, image.height),
             bits: unknown.iter().map(|&unknown| u8::from(!unknown)).collect(),
@@ -100,22 +100,22 @@ impl<'a> Hole<'a> {
     }
 
     /// Returns the pixel to copy, drawn at random from the places whose error is close to the least. Returns
-    /// `None` when no window within `SURROUND_PX` is completely known.
+    /// `None` when no window within `SEARCH_PX` is completely known.
     fn choose(&self, px: usize, seed: u64) -> Option<usize> {
-        let around = self.around(px);
+        let window = self.window(px);
         let [w, h] = self.size;
         let from = self.copied_from[self.known_within(px, 1).next()?] as i64;
         let near = |at: i64, length: i64| {
-            (at - SURROUND_PX).max(RADIUS)..(at + SURROUND_PX + 1).min(length - RADIUS)
+            (at - SEARCH_PX).max(RADIUS)..(at + SEARCH_PX + 1).min(length - RADIUS)
         };
         let (rows, columns) = (near(from / w, h), near(from % w, w));
         // The places that continue the neighbors' sources give an upper bound of the least error.
         let bound = self
             .known_within(px, 1)
-            .filter_map(|other| self.continued(other, px))
+            .filter_map(|other| self.continuation(other, px))
             .filter(|place| columns.contains(&(*place as i64 % w)))
             .filter(|place| rows.contains(&(*place as i64 / w)))
-            .map(|place| self.distance(&around, place, u32::MAX))
+            .map(|place| self.distance(&window, place, u32::MAX))
             .min()
             .unwrap_or(u32::MAX);
         let found: Vec<(u32, usize)> = rows
@@ -125,7 +125,7 @@ impl<'a> Hole<'a> {
                 let mut least = bound;
                 for place in (y * w + columns.start) as usize..(y * w + columns.end) as usize {
                     if self.whole[place] == 1 {
-                        let distance = self.distance(&around, place, tolerated(least));
+                        let distance = self.distance(&window, place, tolerated(least));
                         least = least.min(distance);
                         if distance <= tolerated(least) {
                             found.push((distance, place));
@@ -136,23 +136,23 @@ impl<'a> Hole<'a> {
             })
             .collect();
         let least = tolerated(found.iter().map(|(distance, _)| *distance).min()?);
-        let likest: Vec<usize> = found
+        let candidates: Vec<usize> = found
             .into_iter()
             .filter(|(distance, _)| *distance <= least)
             .map(|(_, place)| place)
             .collect();
-        let drawn = random::bits(seed, &[px as u64]) % likest.len() as u64;
-        Some(likest[drawn as usize])
+        let drawn = random::bits(seed, &[px as u64]) % candidates.len() as u64;
+        Some(candidates[drawn as usize])
     }
 
     /// Returns the known pixels of the window, those of largest weight first.
-    fn around(&self, px: usize) -> Vec<Around> {
-        let mut around: Vec<Around> = self
+    fn window(&self, px: usize) -> Vec<KnownPixel> {
+        let mut window: Vec<KnownPixel> = self
             .known_within(px, RADIUS)
             .map(|other| {
                 let (dx, dy) = self.offset(px, other);
                 let weight = |d: i64| WEIGHTS[d.unsigned_abs() as usize];
-                Around {
+                KnownPixel {
                     dx,
                     dy,
                     weight: weight(dx) * weight(dy),
@@ -160,19 +160,19 @@ impl<'a> Hole<'a> {
                 }
             })
             .collect();
-        around.sort_by_key(|a| std::cmp::Reverse(a.weight));
-        around
+        window.sort_by_key(|a| std::cmp::Reverse(a.weight));
+        window
     }
 
     /// Returns the weighted sum of squared differences. Stops early once the sum exceeds `bound`.
-    fn distance(&self, around: &[Around], place: usize, bound: u32) -> u32 {
+    fn distance(&self, window: &[KnownPixel], place: usize, bound: u32) -> u32 {
         let mut sum = 0;
-        for Around {
+        for KnownPixel {
             dx,
             dy,
             weight,
             color,
-        } in around
+        } in window
         {
             let at = (place as i64 + dy * self.size[0] + dx) as usize;
             let there = &self.image.pixels[3 * at..3 * at + 3];
@@ -187,7 +187,7 @@ impl<'a> Hole<'a> {
 
     /// Returns the source of a pixel if it continues the source of its neighbor; `None` if that cannot be
     /// copied.
-    fn continued(&self, neighbor: usize, px: usize) -> Option<usize> {
+    fn continuation(&self, neighbor: usize, px: usize) -> Option<usize> {
         let (dx, dy) = self.offset(neighbor, px);
         let from = self.copied_from[neighbor] as i64;
         let (x, y) = (from % self.size[0] + dx, from / self.size[0] + dy);
@@ -227,8 +227,8 @@ pub(super) fn smooth(image: &mut RgbImage, unknown: &[bool]) {
     while !open.is_empty() {
         let known_around = |px: usize| {
             let (x, y) = (px as i64 % w, px as i64 / w);
-            let around = (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
-            around
+            let neighbors = (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
+            neighbors
                 .filter(move |&(x, y)| (0..w).contains(&x) && (0..h).contains(&y))
                 .map(move |(x, y)| (y * w + x) as usize)
         };
@@ -291,14 +291,14 @@ mod tests {
     }
 
     #[test]
-    fn stripes_go_on_through_a_hole_exactly() {
+    fn stripes_continue_exactly_through_a_hole() {
         let (mut image, unknown) = with_hole(&stripes(), 18);
         sample_texture(&mut image, &unknown, 1);
         assert!(image == stripes());
     }
 
     #[test]
-    fn a_coarse_grain_keeps_its_contrast_where_a_smooth_fill_loses_it() {
+    fn sampled_texture_keeps_the_contrast_of_coarse_grain() {
         let mut grain = RgbImage::new(72, 60);
         for (k, pixel) in grain.pixels.chunks_exact_mut(3).enumerate() {
             let cell = (k as u64 % 72 / 2, k as u64 / 72 / 2);
@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn the_seed_decides_and_the_number_of_threads_does_not() {
+    fn fill_depends_on_the_seed_and_not_on_threads() {
         let mut noisy = stripes();
         for (k, value) in noisy.pixels.iter_mut().enumerate() {
             *value += (random::bits(9, &[k as u64]) % 40) as u8;
@@ -341,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_texture_around_it_takes_the_color_beside_it() {
+    fn hole_without_complete_window_takes_the_color_beside_it() {
         let mut image = RgbImage::new(6, 6);
         image.pixels.fill(90);
         let mut unknown = vec![false; 36];
@@ -354,7 +354,7 @@ mod tests {
     }
 
     #[test]
-    fn an_image_of_which_nothing_is_known_stays_as_it_is() {
+    fn image_without_known_pixels_stays_unchanged() {
         let mut image = RgbImage::new(9, 9);
         image.pixels.fill(7);
         sample_texture(&mut image, &[true; 81], 1);

@@ -7,37 +7,29 @@
 //! and light that falls off in any direction. All gains and factors are medians of pixel ratios, so that the
 //! animal has no effect.
 
-use std::ops::Range;
-
-use super::plate::Plate;
+use super::background::Background;
+use super::probes::{DARKEST, N_PROBES, RATIO_STEPS};
 use crate::order;
-use crate::random;
-use crate::raster::{Frame, RgbImage};
+use crate::raster::Frame;
 
-/// Number of pixels compared in each frame, at fixed random places. Free choice.
-const N_SAMPLES: u64 = 4096;
-/// Steps of the histogram of ratios per unit; it covers ratios from 0 to 4.
-const STEPS: usize = 1024;
-/// Largest value of a background channel that is too dark to compare, levels of 255. Free choice.
-const DARKEST: u32 = 16;
+/// Length of the histogram of ratios, which covers ratios from 0 to 4.
+const N_RATIOS: usize = 4 * RATIO_STEPS;
 /// Least number of bright pixels for a gain, 5 % of the pixels compared. With fewer, the animal may cover
 /// most of them. Free choice.
-const LEAST_PROBES: u32 = N_SAMPLES as u32 / 20;
+const MIN_PROBES: u32 = N_PROBES as u32 / 20;
 /// Least gain accepted as light. Free choice.
-const DARKEST_GAIN: f32 = 0.2;
+const MIN_GAIN: f32 = 0.2;
 /// Upper limit of gains accepted as light, exclusive. Free choice below 4, where the histogram ends.
-const BRIGHTEST_GAIN: f32 = 3.9;
+const MAX_GAIN: f32 = 3.9;
 /// Number of pixels compared in a row or column, at most. Free choice.
-const ALONG: usize = 160;
+const MAX_PER_LINE: usize = 160;
 /// Least number of bright pixels for the factor of a row or column. Free choice.
-const LEAST_ALONG: usize = 24;
-/// Light is colored if a channel's gain deviates from the luma gain by at least this share. Free choice.
-const COLORED: f32 = 0.02;
+const MIN_PER_LINE: usize = 24;
 /// Neighbors on either side whose factors are averaged. A 100 Hz lamp gives at most about ten bands in a
 /// picture, and they are far broader.
-const SMOOTH: usize = 2;
+const SMOOTHING_RADIUS: usize = 2;
 /// Light is uneven if the 90th percentile of |factor - 1| of rows or columns exceeds this. Free choice.
-const UNEVEN: f64 = 0.012;
+const UNEVEN_DEVIATION: f64 = 0.012;
 /// Light of the footage is uneven if it is so in more than this share of the frames examined. Free choice.
 const UNEVEN_SHARE: f64 = 0.1;
 
@@ -47,21 +39,21 @@ pub struct Light {
     /// Gains of R, G and B; 1 where frame and background are equally bright.
     pub rgb: [f32; 3],
     /// Further luma factors; `None` where the light is even.
-    field: Option<Field>,
+    line_factors: Option<LineFactors>,
 }
 
 /// Luma factors in addition to the gain: at (x, y) the light is `gain * rows[y] * columns[x]`.
 #[derive(Clone, Debug, PartialEq)]
-struct Field {
+struct LineFactors {
     rows: Vec<f32>,
     columns: Vec<f32>,
 }
 
 impl Light {
     /// The light of the background itself.
-    pub const SAME: Light = Light {
+    pub const NEUTRAL: Light = Light {
         rgb: [1.0; 3],
-        field: None,
+        line_factors: None,
     };
 
     /// Returns the approximate gain of luma, exact enough to propose boxes.
@@ -70,40 +62,25 @@ impl Light {
     }
 
     /// Returns 1 / gain of each channel in 12-bit fixed point: apply it as `(value * factor + 2048) >> 12`.
-    pub fn to_plate(&self) -> [i32; 3] {
+    pub fn inverse_gains(&self) -> [i32; 3] {
         self.rgb.map(|gain| (4096.0 / gain).round() as i32)
     }
 
     /// Returns whether the light varies over the picture.
     pub fn is_uneven(&self) -> bool {
-        self.field.is_some()
+        self.line_factors.is_some()
     }
 
     /// Returns the luma factor at a pixel in addition to the gain; 1 where the light is even.
     pub fn factor(&self, x: usize, y: usize) -> f32 {
-        let of = |field: &Field| field.rows[y] * field.columns[x];
-        self.field.as_ref().map_or(1.0, of)
+        let at_pixel = |factors: &LineFactors| factors.rows[y] * factors.columns[x];
+        self.line_factors.as_ref().map_or(1.0, at_pixel)
     }
 
-    /// Divides a frame by its light: luma by gain and factor of the pixel, chroma by the luma gain. If the
-    /// light is colored, each RGB channel is then divided by its remaining gain.
+    /// Divides a frame by its light: luma by gain and factor of the pixel, chroma by the luma gain. The color
+    /// of the light remains.
     pub fn undo(&self, frame: &mut Frame) {
         let gain = self.luma();
-        self.undo_gain(frame, gain);
-        let tint = self.rgb.map(|of_channel| of_channel / gain);
-        if tint.iter().all(|t| (t - 1.0).abs() < COLORED) {
-            return;
-        }
-        let mut image = frame.to_rgb();
-        for pixel in image.pixels.chunks_exact_mut(3) {
-            for (value, tint) in pixel.iter_mut().zip(tint) {
-                *value = (f32::from(*value) / tint).round().min(255.0) as u8;
-            }
-        }
-        frame.draw_all_rgb(&image);
-    }
-
-    fn undo_gain(&self, frame: &mut Frame, gain: f32) {
         if (gain - 1.0).abs() < 0.002 && !self.is_uneven() {
             return;
         }
@@ -119,13 +96,13 @@ impl Light {
         };
         let (luma, chroma) = frame.planes.split_at_mut(n_px);
         let table: Vec<u8> = (0..=255).map(|y| scaled(y, black, gain)).collect();
-        match &self.field {
+        match &self.line_factors {
             None => luma
                 .iter_mut()
                 .for_each(|value| *value = table[usize::from(*value)]),
-            Some(field) => {
-                for (row, &by_row) in luma.chunks_exact_mut(width).zip(&field.rows) {
-                    for (value, &by_column) in row.iter_mut().zip(&field.columns) {
+            Some(factors) => {
+                for (row, &by_row) in luma.chunks_exact_mut(width).zip(&factors.rows) {
+                    for (value, &by_column) in row.iter_mut().zip(&factors.columns) {
                         *value = scaled(*value, black, gain * by_row * by_column);
                     }
                 }
@@ -138,96 +115,62 @@ impl Light {
     }
 }
 
-/// A pixel whose brightness is compared in every frame.
-pub struct Probe {
-    /// Index of its luma value.
-    luma_at: u32,
-    /// Index of its chroma values in their planes.
-    chroma_at: u32,
-    /// R, G and B of the background.
-    base: [u32; 3],
-    /// 2^32 / base, rounded up, to divide by multiplication; 0 where the background is too dark.
-    inverse: [u32; 3],
-}
-
-/// Returns the pixels to compare with a background, in the order of their indices.
-pub fn probes(plate: &RgbImage) -> Vec<Probe> {
-    let n_px = u64::from(plate.width) * u64::from(plate.height);
-    let mut places: Vec<u32> = (0..N_SAMPLES)
-        .map(|k| (random::bits(0, &[k]) % n_px) as u32)
-        .collect();
-    places.sort_unstable();
-    let probe = |luma_at: u32| {
-        let (x, y) = (luma_at % plate.width, luma_at / plate.width);
-        let base = plate.pixel(x, y).map(u32::from);
-        let inverse = |base| match base {
-            0..=DARKEST => 0,
-            base => (1u64 << 32).div_ceil(u64::from(base)) as u32,
-        };
-        Probe {
-            luma_at,
-            chroma_at: y / 2 * plate.width.div_ceil(2) + x / 2,
-            base,
-            inverse: base.map(inverse),
-        }
-    };
-    places.into_iter().map(probe).collect()
-}
-
 /// Returns the light of a frame. Measures rows and columns only if the background has `uneven_light`.
-pub fn of(frame: &Frame, plate: &Plate) -> Light {
+pub fn measure(frame: &Frame, background: &Background) -> Light {
     let mut light = Light {
-        rgb: gain(frame, plate),
-        field: None,
+        rgb: gain(frame, background),
+        line_factors: None,
     };
-    if plate.uneven_light {
-        light.field = Some(field(frame, &plate.frame, light.luma()));
+    if background.uneven_light {
+        light.line_factors = Some(line_factors(frame, &background.frame, light.luma()));
     }
     light
 }
 
 /// Returns whether the light of the footage varies over the picture, measured on some of its frames.
-pub fn is_uneven<'a>(frames: impl ExactSizeIterator<Item = &'a Frame>, plate: &Plate) -> bool {
+pub fn is_uneven(frames: &[&Frame], background: &Background) -> bool {
     let n_frames = frames.len();
     let deviates = |frame: &Frame| {
-        let field = field(frame, &plate.frame, luma_of(gain(frame, plate)));
-        let off = |factors: &[f32]| {
-            let mut off: Vec<f64> = factors.iter().map(|f| f64::from((f - 1.0).abs())).collect();
-            order::percentile(&mut off, 0.9).unwrap_or(0.0)
+        let gain = luma_of(gain(frame, background));
+        let factors = line_factors(frame, &background.frame, gain);
+        let deviation = |factors: &[f32]| {
+            let mut all: Vec<f64> = factors.iter().map(|f| f64::from((f - 1.0).abs())).collect();
+            order::percentile(&mut all, 0.9).unwrap_or(0.0)
         };
-        off(&field.rows).max(off(&field.columns)) > UNEVEN
+        deviation(&factors.rows).max(deviation(&factors.columns)) > UNEVEN_DEVIATION
     };
-    let n_uneven = frames.filter(|frame| deviates(frame)).count();
+    let n_uneven = frames.iter().filter(|frame| deviates(frame)).count();
     n_uneven as f64 > UNEVEN_SHARE * n_frames as f64
 }
 
 fn luma_of(rgb: [f32; 3]) -> f32 {
-    Light { rgb, field: None }.luma()
+    Light {
+        rgb,
+        line_factors: None,
+    }
+    .luma()
 }
 
-/// Returns the median ratio of frame to background for each channel. Pixels whose ratio differs by more than
-/// a quarter from the median of all pixels, such as the animal's, do not count.
-fn gain(frame: &Frame, plate: &Plate) -> [f32; 3] {
+/// Returns the median ratio of frame to background for each channel.
+fn gain(frame: &Frame, background: &Background) -> [f32; 3] {
     let convert = frame.color.to_rgb();
     let (luma, (u, v)) = (frame.luma(), frame.chroma());
-    let mut counts = [[0u16; 4 * STEPS]; 3];
-    for probe in &plate.probes {
-        let chroma = probe.chroma_at as usize;
-        let rgb = convert.convert(luma[probe.luma_at as usize], u[chroma], v[chroma]);
+    let mut counts = [[0u16; N_RATIOS]; 3];
+    for probe in &background.probes {
+        let chroma = probe.chroma_idx as usize;
+        let rgb = convert.convert(luma[probe.luma_idx as usize], u[chroma], v[chroma]);
         for channel in 0..3 {
-            // (value * STEPS + base / 2) / base, exact because the dividend is below 2^19.
-            let dividend = u32::from(rgb[channel]) * STEPS as u32 + probe.base[channel] / 2;
-            let ratio = (u64::from(dividend) * u64::from(probe.inverse[channel])) >> 32;
-            counts[channel][(ratio as usize).min(4 * STEPS - 1)] += 1;
+            let ratio = probe.ratio(channel, rgb[channel]);
+            counts[channel][ratio.min(N_RATIOS - 1)] += 1;
         }
     }
     let n_dark = |channel: usize| {
-        let dark = plate.probes.iter().filter(|p| p.inverse[channel] == 0);
+        let dark = background.probes.iter().filter(|p| p.is_dark(channel));
         dark.count() as u16
     };
     let median = |channel: usize| {
         counts[channel][0] -= n_dark(channel);
-        median_ratio(&counts[channel])
+        median_gain(&counts[channel])
     };
     let gains = [0, 1, 2].map(median);
     // A channel of unknown gain takes the mean gain of the others.
@@ -239,58 +182,46 @@ fn gain(frame: &Frame, plate: &Plate) -> [f32; 3] {
     gains.map(|gain| gain.unwrap_or(usual))
 }
 
-/// Returns the median of the counted ratios within a quarter of their median. Returns `None` when too few
-/// pixels are bright enough or when most ratios disagree, because then something other than light differs.
-fn median_ratio(counts: &[u16; 4 * STEPS]) -> Option<f32> {
+/// Returns the median of the counted ratios. Returns `None` when too few pixels are bright enough or when
+/// light does not reach that ratio.
+fn median_gain(counts: &[u16; N_RATIOS]) -> Option<f32> {
     let n: u32 = counts.iter().map(|&count| u32::from(count)).sum();
-    let middle = median_step(counts, 0..4 * STEPS);
-    let near = middle - middle / 4..(middle + middle / 4 + 1).min(4 * STEPS);
-    let n_near: u32 = counts[near.clone()].iter().map(|&c| u32::from(c)).sum();
-    let gain = median_step(counts, near) as f32 / STEPS as f32;
-    let agree =
-        n >= LEAST_PROBES && 2 * n_near > n && (DARKEST_GAIN..BRIGHTEST_GAIN).contains(&gain);
-    agree.then_some(gain)
-}
-
-/// Returns the step at which the cumulative count within `steps` reaches half.
-fn median_step(counts: &[u16; 4 * STEPS], steps: Range<usize>) -> usize {
-    let n: u32 = counts[steps.clone()].iter().map(|&c| u32::from(c)).sum();
     let mut below = 0;
-    steps
-        .clone()
-        .find(|&step| {
-            below += u32::from(counts[step]);
-            2 * below >= n
-        })
-        .unwrap_or(steps.start)
+    let middle = counts.iter().position(|&count| {
+        below += u32::from(count);
+        2 * below >= n
+    })?;
+    let gain = middle as f32 / RATIO_STEPS as f32;
+    let is_light = n >= MIN_PROBES && (MIN_GAIN..MAX_GAIN).contains(&gain);
+    is_light.then_some(gain)
 }
 
 /// Returns the factors of the rows, and of the columns after division by the rows.
-fn field(frame: &Frame, plate: &Frame, gain: f32) -> Field {
+fn line_factors(frame: &Frame, background: &Frame, gain: f32) -> LineFactors {
     let (width, height) = (frame.width as usize, frame.height as usize);
     let black = frame.color.black();
-    let (luma, base) = (frame.luma(), plate.luma());
+    let (luma, base) = (frame.luma(), background.luma());
     let ratio = |at: usize| {
         let below = f32::from(base[at]) - black;
         (below > DARKEST as f32).then(|| (f32::from(luma[at]) - black) / (gain * below))
     };
-    let step_x = width.div_ceil(ALONG);
+    let step_x = width.div_ceil(MAX_PER_LINE);
     let rows = smoothed((0..height).map(|y| {
         let along = (y % step_x..width).step_by(step_x);
         median_factor(along.filter_map(|x| ratio(y * width + x)))
     }));
-    let step_y = height.div_ceil(ALONG);
+    let step_y = height.div_ceil(MAX_PER_LINE);
     let columns = smoothed((0..width).map(|x| {
         let along = (x % step_y..height).step_by(step_y);
         median_factor(along.filter_map(|y| Some(ratio(y * width + x)? / rows[y])))
     }));
-    Field { rows, columns }
+    LineFactors { rows, columns }
 }
 
-/// Returns the median of the ratios that light can cause; `None` for fewer than `LEAST_ALONG`.
+/// Returns the median of the ratios that light can cause; `None` for fewer than `MIN_PER_LINE`.
 fn median_factor(ratios: impl Iterator<Item = f32>) -> Option<f32> {
     let mut ratios: Vec<f32> = ratios.filter(|r| (0.4..2.5).contains(r)).collect();
-    if ratios.len() < LEAST_ALONG {
+    if ratios.len() < MIN_PER_LINE {
         return None;
     }
     let middle = ratios.len() / 2;
@@ -300,7 +231,9 @@ fn median_factor(ratios: impl Iterator<Item = f32>) -> Option<f32> {
 /// Replaces each factor by the mean of the known factors around it; 1 where none is known.
 fn smoothed(factors: impl Iterator<Item = Option<f32>>) -> Vec<f32> {
     let factors: Vec<Option<f32>> = factors.collect();
-    let near = |k: usize| k.saturating_sub(SMOOTH)..(k + SMOOTH + 1).min(factors.len());
+    let near = |k: usize| {
+        k.saturating_sub(SMOOTHING_RADIUS)..(k + SMOOTHING_RADIUS + 1).min(factors.len())
+    };
     (0..factors.len())
         .map(|k| {
             let known = factors[near(k)].iter().flatten();
@@ -313,43 +246,19 @@ fn smoothed(factors: impl Iterator<Item = Option<f32>>) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random;
     use crate::raster::ColorSpec;
 
     #[test]
-    fn the_inverse_divides_exactly() {
-        for base in DARKEST + 1..256 {
-            let inverse = (1u64 << 32).div_ceil(u64::from(base));
-            for value in 0..256 {
-                let dividend = value * STEPS as u32 + base / 2;
-                assert_eq!(
-                    (u64::from(dividend) * inverse) >> 32,
-                    u64::from(dividend / base)
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn a_dark_animal_does_not_move_the_median_of_the_light() {
-        // 3010 probes are on average 10 % brighter, and 1000 lie on a black animal.
-        let mut counts = [0u16; 4 * STEPS];
-        counts[100] = 1000;
-        for k in 0..301 {
-            counts[1126 - 150 + k] = 10;
-        }
-        assert_eq!(median_ratio(&counts), Some(1126.0 / 1024.0));
-    }
-
-    #[test]
     fn bands_and_a_slope_of_light_are_measured_and_undone() {
-        let mut plate = Frame::new(160, 120, ColorSpec::default());
-        for (k, value) in plate.planes.iter_mut().enumerate() {
+        let mut background = Frame::new(160, 120, ColorSpec::default());
+        for (k, value) in background.planes.iter_mut().enumerate() {
             *value = 90 + (random::bits(1, &[k as u64]) % 40) as u8;
         }
         let light = |x: usize, y: usize| {
             (1.0 + 0.1 * libm::sin(y as f64 / 9.0)) * libm::exp(-0.002 * x as f64)
         };
-        let mut frame = plate.clone();
+        let mut frame = background.clone();
         for (k, value) in frame.planes[..160 * 120].iter_mut().enumerate() {
             let lit = (f64::from(*value) - 16.0) * light(k % 160, k / 160);
             // An animal covers a fifth of the rows.
@@ -361,16 +270,16 @@ mod tests {
         }
         let mut found = Light {
             rgb: [1.0; 3],
-            field: Some(field(&frame, &plate, 1.0)),
+            line_factors: Some(line_factors(&frame, &background, 1.0)),
         };
         found.undo(&mut frame);
-        let off = |k: usize| frame.planes[k].abs_diff(plate.planes[k]);
+        let off = |k: usize| frame.planes[k].abs_diff(background.planes[k]);
         let worst = (0..160 * 120)
             .filter(|k| !(38..66).contains(&(k / 160)))
             .map(off)
             .max();
         assert!(worst.is_some_and(|worst| worst <= 4), "{worst:?}");
-        found.field = None;
+        found.line_factors = None;
         assert!(!found.is_uneven());
     }
 }

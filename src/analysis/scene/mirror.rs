@@ -10,14 +10,14 @@ use crate::order::median;
 use crate::raster::runs::{self, Component};
 
 /// Largest deviation of an image from its expected place, as a share of the animal's diagonal. Free choice.
-const AGREEMENT: f64 = 0.15;
+const MAX_DEVIATION: f64 = 0.15;
 /// Least share of the pairs that must agree with the mirror, 0..=1. Free choice.
-const OFTEN: f64 = 0.8;
+const MIN_AGREEING_SHARE: f64 = 0.8;
 /// Least number of pairs for a decision. Free choice.
-const LEAST_PAIRS: usize = 6;
+const MIN_PAIRS: usize = 6;
 /// Least range of the animal's motion, as a share of its diagonal. A resting pair agrees with any mirror.
 /// Free choice.
-const MOVES: f64 = 0.5;
+const MIN_RANGE: f64 = 0.5;
 
 /// A line along an axis of the picture, and the side of it on which images lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,35 +37,22 @@ impl Mirror {
     }
 
     /// Splits a component at the line. The animal touches its image where it touches the mirror.
-    pub fn parted(&self, component: Component) -> Vec<Component> {
+    pub fn split(&self, component: Component) -> Vec<Component> {
         let rect = component.rect;
         let line = self.line_px.round().max(0.0) as u32;
-        let halves = match self.axis {
-            0 if rect.x < line && line < rect.right() => [
-                Rect {
-                    w: line - rect.x,
-                    ..rect
-                },
-                Rect {
-                    x: line,
-                    w: rect.right() - line,
-                    ..rect
-                },
-            ],
-            1 if rect.y < line && line < rect.bottom() => [
-                Rect {
-                    h: line - rect.y,
-                    ..rect
-                },
-                Rect {
-                    y: line,
-                    h: rect.bottom() - line,
-                    ..rect
-                },
-            ],
+        let [mut before, mut after] = [rect; 2];
+        match self.axis {
+            0 if rect.x < line && line < rect.right() => {
+                before.w = line - rect.x;
+                (after.x, after.w) = (line, rect.right() - line);
+            }
+            1 if rect.y < line && line < rect.bottom() => {
+                before.h = line - rect.y;
+                (after.y, after.h) = (line, rect.bottom() - line);
+            }
             _ => return vec![component],
-        };
-        halves
+        }
+        [before, after]
             .into_iter()
             .flat_map(|half| runs::components(&component.mask(half)))
             .collect()
@@ -73,14 +60,14 @@ impl Mirror {
 
     /// Returns the mirror that explains the pairs of objects seen together in samples; `None` where none
     /// does. Prefers a horizontal line. `diagonal_px` is the animal's diagonal.
-    pub(super) fn of(pairs: &[[&Look; 2]], diagonal_px: f64) -> Option<Mirror> {
+    pub(super) fn from_pairs(pairs: &[[&Look; 2]], diagonal_px: f64) -> Option<Mirror> {
         [1, 0]
             .into_iter()
             .find_map(|axis| Mirror::along(axis, pairs, diagonal_px))
     }
 
     fn along(axis: usize, pairs: &[[&Look; 2]], diagonal_px: f64) -> Option<Mirror> {
-        let tolerance_px = AGREEMENT * diagonal_px;
+        let tolerance_px = MAX_DEVIATION * diagonal_px;
         let sum = |[a, b]: &[&Look; 2]| a.centroid_px[axis] + b.centroid_px[axis];
         let apart = |[a, b]: &[&Look; 2]| a.centroid_px[1 - axis] - b.centroid_px[1 - axis];
         let usual = median(pairs.iter().map(sum))?;
@@ -92,9 +79,9 @@ impl Mirror {
             let at = || agreeing.iter().map(|[a, _]| a.centroid_px[c]);
             at().fold(f64::MIN, f64::max) - at().fold(f64::MAX, f64::min)
         };
-        let enough = agreeing.len() >= LEAST_PAIRS
-            && agreeing.len() as f64 >= OFTEN * pairs.len() as f64
-            && moved(0).max(moved(1)) > MOVES * diagonal_px;
+        let enough = agreeing.len() >= MIN_PAIRS
+            && agreeing.len() as f64 >= MIN_AGREEING_SHARE * pairs.len() as f64
+            && moved(0).max(moved(1)) > MIN_RANGE * diagonal_px;
         let line_px = usual / 2.0;
         // An image has less contrast than its object.
         let fainter_before = |[a, b]: &&&[&Look; 2]| {
@@ -119,7 +106,7 @@ mod tests {
     fn look(centroid_px: [f64; 2], contrast: f64) -> Look {
         Look {
             area_px: 400.0,
-            color: Color::of(std::iter::empty()),
+            color: Color::from_pixels(std::iter::empty()),
             contrast,
             box_px: Rect::of_size(40, 20),
             centroid_px,
@@ -144,18 +131,18 @@ mod tests {
             })
             .collect();
         let pairs: Vec<[&Look; 2]> = looks.iter().map(|[a, b]| [a, b]).collect();
-        Mirror::of(&pairs, 45.0)
+        Mirror::from_pairs(&pairs, 45.0)
     }
 
     #[test]
-    fn an_image_in_the_surface_is_told_from_a_second_animal() {
+    fn image_in_the_surface_is_distinguished_from_a_second_animal() {
         let mirror = found(|_, [x, y]| [x + 1.0, 222.0 - y]).expect("it is an image");
         assert!(mirror.is_image([100.0, 40.0]) && !mirror.is_image([100.0, 140.0]));
         assert_eq!(found(|k, _| [200.0 + 90.0 * libm::cos(k), 60.0]), None);
     }
 
     #[test]
-    fn an_animal_at_the_surface_is_parted_from_its_image() {
+    fn animal_at_the_surface_is_split_from_its_image() {
         let mirror = found(|_, [x, y]| [x, 40.0 - y]).expect("it is an image");
         let touching = Mask {
             rect: Rect {
@@ -166,7 +153,7 @@ mod tests {
             },
             bits: vec![1; 96],
         };
-        let parts = mirror.parted(runs::components(&touching).remove(0));
+        let parts = mirror.split(runs::components(&touching).remove(0));
         let boxes: Vec<[u32; 2]> = parts
             .iter()
             .map(|part| [part.rect.y, part.rect.h])
@@ -179,6 +166,6 @@ mod tests {
             },
             ..touching
         };
-        assert_eq!(mirror.parted(runs::components(&below).remove(0)).len(), 1);
+        assert_eq!(mirror.split(runs::components(&below).remove(0)).len(), 1);
     }
 }

@@ -17,43 +17,43 @@ use crate::geometry::Rect;
 use crate::progress::Progress;
 use crate::raster::{Frame, RgbImage};
 
-mod draft;
+pub mod background;
+mod background_estimate;
 mod fill;
+mod ghost;
 pub mod light;
 pub mod mirror;
 mod occupancy;
-pub mod plate;
-mod ranks;
+mod pixel_statistics;
+mod probes;
 mod refusal;
 mod resting;
 mod samples;
 mod scenery;
-mod shift;
 mod states;
 mod survey;
 mod sway;
 mod thumbnail;
 mod windows;
 
-use draft::Draft;
+use background::Background;
+use background_estimate::BackgroundEstimate;
 use light::Light;
 use mirror::Mirror;
-use occupancy::Occupancy;
-use plate::Plate;
-use refusal::Company;
+use refusal::SimilarObjects;
 use samples::Samples;
 use survey::Survey;
 
 /// Largest share of blocks that may differ where a frame shows a background's scene, 0..=1. Free choice.
-const FOREIGN: f64 = 0.5;
+const MAX_DIFFERING_SHARE: f64 = 0.5;
 
 /// The scene of a footage.
 pub struct Scene {
     /// The backgrounds, the one with the most samples first.
-    pub plates: Vec<Plate>,
+    pub backgrounds: Vec<Background>,
     /// For each sample its frame index and the index of its background, ordered by frame. `place` first tries
     /// the backgrounds of the samples around a frame.
-    likely: Vec<(usize, Option<usize>)>,
+    samples: Vec<(usize, Option<usize>)>,
     /// Typical appearance of the animal in the samples.
     pub subject: Subject,
     /// Half the width below which a part of the animal's component counts as thin, pixels. `None` where no
@@ -69,10 +69,10 @@ pub struct Scene {
 
 /// A frame matched with the background that it shows.
 pub struct Placed<'a> {
-    /// Index of the background in `Scene::plates`.
-    pub plate_idx: usize,
+    /// Index of the background in `Scene::backgrounds`.
+    pub background_idx: usize,
     /// The background.
-    pub plate: &'a Plate,
+    pub background: &'a Background,
     /// Light of the frame relative to the background.
     pub light: Light,
     /// Boxes of the picture that may differ from the background.
@@ -82,18 +82,22 @@ pub struct Placed<'a> {
 impl Scene {
     /// Builds the scene from finished backgrounds. A last survey yields the subject, under the same
     /// thresholds as tracking.
-    fn of(draft: Draft, samples: &Samples, company: Company) -> Result<Scene, Error> {
-        let survey = Survey::of(samples, &draft.plates, &draft.plate_of);
+    fn new(
+        estimate: BackgroundEstimate,
+        samples: &Samples,
+        similar_objects: SimilarObjects,
+    ) -> Result<Scene, Error> {
+        let survey = Survey::new(samples, &estimate.of_samples());
         let frames = samples.frame_idx.iter().copied();
         Ok(Scene {
-            plates: draft.plates,
-            likely: frames.zip(draft.plate_of).collect(),
+            backgrounds: estimate.backgrounds,
+            samples: frames.zip(estimate.background_of).collect(),
             subject: survey.subject.ok_or(Error::NothingMoves)?,
             tether_px: survey.tether_px,
-            several_animals: matches!(company, Company::Animals),
-            mirror: match company {
-                Company::Image(mirror) => Some(mirror),
-                Company::None | Company::Animals => None,
+            several_animals: matches!(similar_objects, SimilarObjects::Animals),
+            mirror: match similar_objects {
+                SimilarObjects::MirrorImage(mirror) => Some(mirror),
+                SimilarObjects::None | SimilarObjects::Animals => None,
             },
             is_masked: samples.are_masked(),
         })
@@ -104,43 +108,41 @@ impl Scene {
     pub fn place(&self, frame_idx: usize, frame: &Frame) -> Option<Placed<'_>> {
         if self.is_masked {
             return Some(Placed {
-                plate_idx: 0,
-                plate: &self.plates[0],
-                light: Light::SAME,
+                background_idx: 0,
+                background: &self.backgrounds[0],
+                light: Light::NEUTRAL,
                 boxes: Vec::new(),
             });
         }
-        let after = self.likely.partition_point(|(at, _)| *at < frame_idx);
+        let after = self.samples.partition_point(|(at, _)| *at < frame_idx);
         let around = [after.checked_sub(1), Some(after)];
         let near = around
             .into_iter()
             .flatten()
-            .filter_map(|at| self.likely.get(at));
-        let mut tried: Vec<usize> = near.filter_map(|(_, plate)| *plate).collect();
+            .filter_map(|at| self.samples.get(at));
+        let mut tried: Vec<usize> = near.filter_map(|(_, background)| *background).collect();
         tried.dedup();
-        let likely = tried
-            .iter()
-            .map(|&plate_idx| self.compare(plate_idx, frame))
-            .min_by(|a, b| a.1.total_cmp(&b.1));
-        let best = match likely.filter(|(_, share)| *share <= FOREIGN) {
-            Some(likely) => Some(likely),
-            None => (0..self.plates.len())
-                .filter(|plate_idx| !tried.contains(plate_idx))
-                .map(|plate_idx| self.compare(plate_idx, frame))
-                .filter(|(_, share)| *share <= FOREIGN)
-                .min_by(|a, b| a.1.total_cmp(&b.1)),
+        let best_of = |backgrounds: &[usize]| {
+            let compared = backgrounds.iter().map(|&at| self.compare(at, frame));
+            compared
+                .filter(|(_, share)| *share <= MAX_DIFFERING_SHARE)
+                .min_by(|a, b| a.1.total_cmp(&b.1))
         };
+        let others = (0..self.backgrounds.len()).filter(|at| !tried.contains(at));
+        let best = best_of(&tried).or_else(|| best_of(&others.collect::<Vec<_>>()));
         best.map(|(placed, _)| placed)
     }
 
     /// Matches a frame with one background. Also returns the share of blocks that differ, 0..=1.
-    fn compare(&self, plate_idx: usize, frame: &Frame) -> (Placed<'_>, f64) {
-        let plate = &self.plates[plate_idx];
-        let light = light::of(frame, plate);
-        let (boxes, share) = plate.blocks.proposals(frame, &light, silhouette::MARGIN_PX);
+    fn compare(&self, background_idx: usize, frame: &Frame) -> (Placed<'_>, f64) {
+        let background = &self.backgrounds[background_idx];
+        let light = light::measure(frame, background);
+        let (boxes, share) = background
+            .blocks
+            .proposals(frame, &light, silhouette::MARGIN_PX);
         let placed = Placed {
-            plate_idx,
-            plate,
+            background_idx,
+            background,
             light,
             boxes,
         };
@@ -160,50 +162,50 @@ pub fn estimate(
 ) -> Result<Scene, Error> {
     let mut samples = Samples::spread(source, params, progress)?;
     if samples.are_masked() {
-        return of_masked(&mut samples, given, params);
+        return estimate_masked(&mut samples, given, params);
     }
-    let mut draft = match given {
-        Some(image) => Draft::given(image, &mut samples, params)?,
-        None => Draft::of_states(&mut samples, params)?,
+    let mut estimate = match given {
+        Some(image) => BackgroundEstimate::from_image(image, &mut samples, params)?,
+        None => BackgroundEstimate::from_states(&mut samples, params)?,
     };
-    let (short, mut survey) = draft.in_short_windows(&samples);
-    let mut seen = draft.occupancy_over_time(&short, &samples, &survey);
+    let (short_windows, mut survey) = estimate.for_short_windows(&samples);
+    let mut occupancy = estimate.occupancy_over_time(&short_windows, &samples, &survey);
     if given.is_none() {
-        draft.split_in_time(&samples, &seen);
+        estimate.split_in_time(&samples, &occupancy);
     }
     for round in 0..2 {
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }
         if round > 0 {
-            seen = Occupancy::of(&samples, &draft.plates, &draft.plate_of, &survey);
+            occupancy = estimate.occupancy(&samples, &survey);
         }
-        draft.paint(&samples, &seen, given.is_some());
-        survey = draft.survey(&samples);
+        estimate.repaint(&samples, &occupancy, given.is_some());
+        survey = estimate.survey(&samples);
     }
-    let company = refusal::judge(&survey, &samples, params)?;
-    let seen = Occupancy::of(&samples, &draft.plates, &draft.plate_of, &survey);
-    draft.finish(&samples, &seen, &survey, given.is_some());
-    Scene::of(draft, &samples, company)
+    let similar_objects = refusal::check(&survey, &samples, params)?;
+    let occupancy = estimate.occupancy(&samples, &survey);
+    estimate.finish(&samples, &occupancy, &survey, given.is_some());
+    Scene::new(estimate, &samples, similar_objects)
 }
 
 /// Estimates the scene of footage with masks of the animal. Movement, dimming and flicker of the scene are no
 /// reason to refuse it.
-fn of_masked(
+fn estimate_masked(
     samples: &mut Samples,
     given: Option<&RgbImage>,
     params: &Params,
 ) -> Result<Scene, Error> {
-    let mut draft = match given {
-        Some(image) => Draft::given(image, samples, params)?,
-        None => Draft::of_all(samples, params),
+    let mut estimate = match given {
+        Some(image) => BackgroundEstimate::from_image(image, samples, params)?,
+        None => BackgroundEstimate::from_all_samples(samples, params),
     };
-    let survey = Survey::of(samples, &draft.plates, &draft.plate_of);
-    let company = refusal::judge_masked(&survey, samples, params)?;
-    let seen = Occupancy::of(samples, &draft.plates, &draft.plate_of, &survey);
-    draft.paint(samples, &seen, given.is_some());
-    draft.finish(samples, &seen, &survey, given.is_some());
-    Scene::of(draft, samples, company)
+    let survey = Survey::new(samples, &estimate.of_samples());
+    let similar_objects = refusal::check(&survey, samples, params)?;
+    let occupancy = estimate.occupancy(samples, &survey);
+    estimate.repaint(samples, &occupancy, given.is_some());
+    estimate.finish(samples, &occupancy, &survey, given.is_some());
+    Scene::new(estimate, samples, similar_objects)
 }
 
 #[cfg(test)]

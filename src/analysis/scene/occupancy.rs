@@ -3,9 +3,9 @@
 //! The foreground components of the survey mark their pixels as taken, as a ghost or as swaying scenery. A
 //! ghost is a place at which the background shows the resting animal and the sample does not.
 
-use super::plate::Plate;
+use super::background::Background;
 use super::samples::Samples;
-use super::survey::{GHOST_SAMPLES, Survey};
+use super::survey::{MIN_GHOST_SAMPLES, Survey};
 use super::sway;
 use crate::raster::runs::Component;
 use crate::raster::{Frame, Mask};
@@ -26,21 +26,20 @@ pub(super) struct Occupancy {
 impl Occupancy {
     /// Marks the pixels of all large components, and of ghosts of any size. With masks, components of any
     /// size count.
-    pub(super) fn of(
+    pub(super) fn new(
         samples: &Samples,
-        plates: &[Plate],
-        plate_of: &[Option<usize>],
+        backgrounds: &[Option<&Background>],
         survey: &Survey,
     ) -> Occupancy {
         let n_px = samples.n_px();
-        let mut seen = Occupancy {
+        let mut occupancy = Occupancy {
             taken: vec![0; n_px],
             ghost: vec![0; n_px],
             scenery: vec![false; n_px],
         };
         let least_area = survey.least_area_px();
-        for (k, components) in survey.found.iter().enumerate() {
-            let Some(plate) = plate_of[k].map(|at| &plates[at].frame) else {
+        for (k, components) in survey.components.iter().enumerate() {
+            let Some(background) = backgrounds[k].map(|background| &background.frame) else {
                 continue;
             };
             for (at, component) in components.iter().enumerate() {
@@ -51,27 +50,34 @@ impl Occupancy {
                 }
                 let rect = component
                     .rect
-                    .inflated(MARGIN_PX, plate.width, plate.height);
+                    .inflated(MARGIN_PX, background.width, background.height);
                 let mut mask = component.mask(rect);
                 if survey.is_scenery(k, at) {
                     let around = mask.dilated_by(MARGIN_PX);
-                    pixels_of(&around, plate.width).for_each(|px| seen.scenery[px] = true);
+                    pixels_of(&around, background.width)
+                        .for_each(|px| occupancy.scenery[px] = true);
                     // An animal that rests in front of a plant forms one component with it.
-                    mask = without_displaced(&mask, &samples.frames[k], plate);
+                    mask = without_scenery(&mask, &samples.frames[k], background);
                 }
                 let mask = mask.dilated_by(MARGIN_PX);
-                let bits = match survey.looks[k][at].is_ghost {
-                    true => &mut seen.ghost,
-                    false => &mut seen.taken,
+                let bits = if survey.looks[k][at].is_ghost {
+                    &mut occupancy.ghost
+                } else {
+                    &mut occupancy.taken
                 };
-                pixels_of(&mask, plate.width).for_each(|px| bits[px] |= 1 << k);
+                pixels_of(&mask, background.width).for_each(|px| bits[px] |= 1 << k);
             }
         }
-        seen
+        occupancy
     }
 
     /// Marks the pixels of a component and its margin as taken in `samples`.
-    pub(super) fn take(&mut self, component: &Component, [width, height]: [u32; 2], samples: u64) {
+    pub(super) fn mark_taken(
+        &mut self,
+        component: &Component,
+        [width, height]: [u32; 2],
+        samples: u64,
+    ) {
         let mask = component.mask(component.rect.inflated(MARGIN_PX, width, height));
         let mask = mask.dilated_by(MARGIN_PX);
         pixels_of(&mask, width).for_each(|px| self.taken[px] |= samples);
@@ -92,13 +98,14 @@ impl Occupancy {
         cells
     }
 
-    /// Returns the samples of `part` in which a pixel shows the scene. If enough samples show a ghost there,
+    /// Returns the samples of `group` in which a pixel shows the scene. If enough samples show a ghost there,
     /// only those count, because in the others the animal covers the pixel.
-    pub(super) fn free(&self, px: usize, part: u64) -> u64 {
-        let ghost = self.ghost[px] & part;
-        match ghost.count_ones() as usize >= GHOST_SAMPLES {
-            true => ghost & !self.taken[px],
-            false => part & !self.taken[px],
+    pub(super) fn free(&self, px: usize, group: u64) -> u64 {
+        let ghost = self.ghost[px] & group;
+        if ghost.count_ones() as usize >= MIN_GHOST_SAMPLES {
+            ghost & !self.taken[px]
+        } else {
+            group & !self.taken[px]
         }
     }
 }
@@ -113,12 +120,12 @@ fn pixels_of(mask: &Mask, width: u32) -> impl Iterator<Item = usize> {
 }
 
 /// Returns the mask without the pixels whose color the background shows nearby, smoothed by a 3 x 3 majority.
-fn without_displaced(mask: &Mask, frame: &Frame, plate: &Frame) -> Mask {
+fn without_scenery(mask: &Mask, frame: &Frame, background: &Frame) -> Mask {
     let mut rest = mask.clone();
-    let pixels: Vec<usize> = pixels_of(mask, plate.width).collect();
+    let pixels: Vec<usize> = pixels_of(mask, background.width).collect();
     let set = rest.bits.iter_mut().filter(|bit| **bit == 1);
     for (bit, px) in set.zip(pixels) {
-        *bit = u8::from(!sway::is_displaced(frame, plate, px));
+        *bit = u8::from(!sway::occurs_nearby(frame, background, px));
     }
     rest.majority()
 }

@@ -11,56 +11,68 @@ use crate::analysis::params::Follow;
 use crate::analysis::subject::{FITS, LEAST_AREA_PX, Look, Subject};
 use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
-use crate::order;
 
 /// Least share of the samples in which the animal must be found, 0..=1. Free choice.
-const MOVING_SHARE: f64 = 0.05;
+const MIN_FOUND_SHARE: f64 = 0.05;
 /// Share of the picture that may differ without being the animal, 0..=1. Free choice.
 const BUSY_AREA: f64 = 0.15;
 /// Share of the samples, 0..=1. The scene moves if more of them exceed `BUSY_AREA`. A second animal must
 /// appear in more of them. Free choice.
-const OFTEN: f64 = 0.3;
+const FREQUENT_SHARE: f64 = 0.3;
 /// Largest median area of the animal, as a share of the picture; a larger one hides too much of the
 /// background. The limit also refuses moving bedding that is mistaken for the animal.
 ///
 /// Free choice: of the films `large_animal` in `bench/cases.py`, which come near it, one is measured wrongly
 /// (docs/measurements.md).
-const LARGE: f64 = 0.15;
+const MAX_AREA_SHARE: f64 = 0.15;
 /// Least area of a second animal, as a share of the animal's area. Free choice.
-const COMPARABLE: f64 = 0.5;
-/// Least range of a second animal, as a share of the animal's diagonal. A swaying plant moves less. Free
-/// choice.
-const ROAMS: f64 = 0.5;
+const MIN_SECOND_AREA: f64 = 0.5;
 
 /// Moving objects besides the animal that look like it.
-pub(super) enum Company {
+pub(super) enum SimilarObjects {
     /// None, or too rarely to matter.
     None,
     /// The animal's mirror image.
-    Image(Mirror),
+    MirrorImage(Mirror),
     /// Other animals.
     Animals,
 }
 
 /// Checks footage by the survey of its samples; fails with the reason to refuse it. Returns the objects that
-/// resemble the animal.
-pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Result<Company, Error> {
-    let n_samples = survey.looks.len() as f64;
-    let n_px = samples.n_px() as f64;
+/// resemble the animal. With masks of the animal, the scene may move.
+pub(super) fn check(
+    survey: &Survey,
+    samples: &Samples,
+    params: &Params,
+) -> Result<SimilarObjects, Error> {
     if let Some(at) = params.animal_at
         && !survey.is_pinned
     {
         return Err(Error::NothingAtPoint(at));
     }
-    let Some(subject) = &survey.subject else {
-        return Err(Error::NothingMoves);
-    };
-    let of_animal = |k: usize| survey.animal[k].map_or(0.0, |at| survey.looks[k][at].area_px);
-    let rest = |k: usize| survey.looks[k].iter().map(|l| l.area_px).sum::<f64>() - of_animal(k);
+    match &survey.subject {
+        None if samples.are_masked() => Err(Error::MasksEmpty),
+        None => Err(Error::NothingMoves),
+        Some(subject) => {
+            if !samples.are_masked() {
+                check_scene(survey, samples, subject)?;
+            }
+            similar_objects(survey, samples, subject, params)
+        }
+    }
+}
+
+/// Fails if the scene moves, or if the animal is found too rarely or is too large.
+fn check_scene(survey: &Survey, samples: &Samples, subject: &Subject) -> Result<(), Error> {
+    let n_samples = survey.looks.len() as f64;
+    let n_px = samples.n_px() as f64;
+    let animal_area_px = |k: usize| survey.animal[k].map_or(0.0, |at| survey.looks[k][at].area_px);
+    let other_area_px =
+        |k: usize| survey.looks[k].iter().map(|l| l.area_px).sum::<f64>() - animal_area_px(k);
     let busy: Vec<usize> = (0..survey.looks.len())
-        .filter(|&k| rest(k) > BUSY_AREA * n_px)
+        .filter(|&k| other_area_px(k) > BUSY_AREA * n_px)
         .collect();
-    if busy.len() as f64 > OFTEN * n_samples {
+    if busy.len() as f64 > FREQUENT_SHARE * n_samples {
         let looks = survey.looks[busy[0]].iter().enumerate();
         let others = looks.filter(|(at, _)| survey.animal[busy[0]] != Some(*at));
         let boxes = others.map(|(_, look)| look.box_px);
@@ -70,10 +82,10 @@ pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Resu
         });
     }
     let n_found = survey.animal.iter().flatten().count() as f64;
-    if n_found < MOVING_SHARE * n_samples {
+    if n_found < MIN_FOUND_SHARE * n_samples {
         return Err(Error::NothingMoves);
     }
-    if subject.area_px() > LARGE * n_px {
+    if subject.area_px() > MAX_AREA_SHARE * n_px {
         let seen =
             (0..survey.looks.len()).filter_map(|k| Some((k, &survey.looks[k][survey.animal[k]?])));
         let off = |look: &Look| (look.area_px - subject.area_px()).abs();
@@ -85,47 +97,30 @@ pub(super) fn judge(survey: &Survey, samples: &Samples, params: &Params) -> Resu
             box_px: look.box_px,
         });
     }
-    company(survey, samples, subject, params)
-}
-
-/// Checks footage with masks of the animal; a moving scene is allowed.
-pub(super) fn judge_masked(
-    survey: &Survey,
-    samples: &Samples,
-    params: &Params,
-) -> Result<Company, Error> {
-    if let Some(at) = params.animal_at
-        && !survey.is_pinned
-    {
-        return Err(Error::NothingAtPoint(at));
-    }
-    let subject = survey.subject.as_ref().ok_or(Error::MasksEmpty)?;
-    company(survey, samples, subject, params)
+    Ok(())
 }
 
 /// Returns the objects that resemble the animal. Fails if they are animals and the parameters do not say
 /// which one to follow.
-fn company(
+fn similar_objects(
     survey: &Survey,
     samples: &Samples,
     subject: &Subject,
     params: &Params,
-) -> Result<Company, Error> {
+) -> Result<SimilarObjects, Error> {
     let n_samples = survey.looks.len() as f64;
     let (in_samples, pairs): (Vec<usize>, Vec<[&Look; 2]>) = (0..survey.looks.len())
         .filter_map(|k| {
             let (looks, at) = (&survey.looks[k], survey.animal[k]?);
-            Some((k, [&looks[at], &looks[second(looks, at, subject)?]]))
+            Some((k, [&looks[at], &looks[second_animal(looks, at, subject)?]]))
         })
         .unzip();
-    let seconds: Vec<&Look> = pairs.iter().map(|[_, second]| *second).collect();
-    if (pairs.len() as f64) <= OFTEN * n_samples || range_px(&seconds) < ROAMS * subject.diagonal_px
-    {
-        return Ok(Company::None);
+    if (pairs.len() as f64) <= FREQUENT_SHARE * n_samples {
+        return Ok(SimilarObjects::None);
     }
-    match Mirror::of(&pairs, subject.diagonal_px) {
-        Some(_) if samples.are_masked() => Ok(Company::None),
-        Some(mirror) => Ok(Company::Image(mirror)),
+    match Mirror::from_pairs(&pairs, subject.diagonal_px) {
+        Some(_) if samples.are_masked() => Ok(SimilarObjects::None),
+        Some(mirror) => Ok(SimilarObjects::MirrorImage(mirror)),
         None if params.follow == Follow::One && params.animal_at.is_none() => {
             // In a pair from the middle of the list, both animals are fully in view.
             let at = pairs.len() / 2;
@@ -134,19 +129,19 @@ fn company(
                 boxes_px: pairs[at].map(|look| look.box_px),
             })
         }
-        None => Ok(Company::Animals),
+        None => Ok(SimilarObjects::Animals),
     }
 }
 
 /// Returns another component that resembles the subject and has a comparable area. The gap to the animal must
 /// exceed the length of the shorter one. Returns `None` if there is none.
-pub(super) fn second(looks: &[Look], animal: usize, subject: &Subject) -> Option<usize> {
+fn second_animal(looks: &[Look], animal: usize, subject: &Subject) -> Option<usize> {
     let first = &looks[animal];
     (0..looks.len()).find(|&at| {
         let look = &looks[at];
         at != animal
             && !look.is_ghost
-            && look.area_px >= (COMPARABLE * first.area_px).max(LEAST_AREA_PX as f64)
+            && look.area_px >= (MIN_SECOND_AREA * first.area_px).max(LEAST_AREA_PX as f64)
             && subject.cost(look) < FITS
             && look.is_shadow == first.is_shadow
             && gap_px(&look.box_px, &first.box_px)
@@ -154,17 +149,7 @@ pub(super) fn second(looks: &[Look], animal: usize, subject: &Subject) -> Option
     })
 }
 
-/// Returns the range of the centroids without the outermost tenth, pixels: the larger of x and y.
-fn range_px(looks: &[&Look]) -> f64 {
-    let along = |axis: usize| {
-        let mut values: Vec<f64> = looks.iter().map(|look| look.centroid_px[axis]).collect();
-        let mut at = |share| order::percentile(&mut values, share).unwrap_or(0.0);
-        at(0.95) - at(0.05)
-    };
-    along(0).max(along(1))
-}
-
-pub(super) fn longest(rect: &Rect) -> u32 {
+fn longest(rect: &Rect) -> u32 {
     rect.w.max(rect.h)
 }
 

@@ -6,49 +6,56 @@
 use crate::raster::runs::Component;
 
 /// Overlap above which two boxes are at the same place (Jaccard index). Free choice.
-const MOSTLY_THERE: f64 = 0.5;
+const SAME_PLACE_OVERLAP: f64 = 0.5;
 /// Overlap above which a box has not moved at all (Jaccard index). Free choice.
-const JUST_THERE: f64 = 0.8;
+const EXACT_OVERLAP: f64 = 0.8;
 
 /// Share of the samples above which a place recurs too often for a passing animal, 0..=1. Free choice.
 const RECURRENCE: f64 = 0.25;
 /// Least share of the recurrences in which the animal must appear elsewhere, 0..=1. Free choice.
-const COMPANY: f64 = 0.5;
+const MIN_ELSEWHERE_SHARE: f64 = 0.5;
 
-/// Returns whether a component is swaying scenery. `found` holds the components of all samples, and `animal`
+/// Returns whether a component is swaying scenery. `samples` holds the components of all samples, and `animal`
 /// the index of the animal among those of each sample.
 pub(super) fn is_scenery(
-    found: &[Vec<Component>],
+    samples: &[Vec<Component>],
     animal: &[Option<usize>],
     component: &Component,
 ) -> bool {
-    let (mut n_times, mut n_in_company) = (0, 0);
-    for (components, animal) in found.iter().zip(animal) {
-        if !components.iter().any(|other| same_place(other, component)) {
+    let (mut n_recurrences, mut n_elsewhere) = (0, 0);
+    for (components, animal) in samples.iter().zip(animal) {
+        if !components
+            .iter()
+            .any(|other| is_same_place(other, component))
+        {
             continue;
         }
-        n_times += 1;
-        let elsewhere = animal.is_some_and(|at| !same_place(&components[at], component));
-        n_in_company += usize::from(elsewhere);
+        n_recurrences += 1;
+        let elsewhere = animal.is_some_and(|at| !is_same_place(&components[at], component));
+        n_elsewhere += usize::from(elsewhere);
     }
-    f64::from(n_times) > RECURRENCE * found.len() as f64
-        && f64::from(n_in_company as u32) >= COMPANY * f64::from(n_times)
+    f64::from(n_recurrences) > RECURRENCE * samples.len() as f64
+        && f64::from(n_elsewhere as u32) >= MIN_ELSEWHERE_SHARE * f64::from(n_recurrences)
 }
 
 /// Returns whether at least `least` samples show a component at exactly the same place; its own sample
 /// counts.
-pub(super) fn recurs(found: &[Vec<Component>], component: &Component, least: usize) -> bool {
+pub(super) fn recurs_exactly(
+    samples: &[Vec<Component>],
+    component: &Component,
+    least: usize,
+) -> bool {
     let here = |components: &&Vec<Component>| {
         components
             .iter()
-            .any(|other| overlap(other, component) > JUST_THERE)
+            .any(|other| overlap(other, component) > EXACT_OVERLAP)
     };
-    found.iter().filter(here).take(least).count() == least
+    samples.iter().filter(here).take(least).count() == least
 }
 
 /// Returns whether the boxes of two components share most of their pixels.
-fn same_place(a: &Component, b: &Component) -> bool {
-    overlap(a, b) > MOSTLY_THERE
+fn is_same_place(a: &Component, b: &Component) -> bool {
+    overlap(a, b) > SAME_PLACE_OVERLAP
 }
 
 /// Returns the Jaccard index of the boxes of two components, 0..=1.
@@ -76,9 +83,9 @@ mod tests {
     }
 
     #[test]
-    fn a_plant_is_scenery_and_the_animal_passing_it_is_not() {
+    fn plant_is_scenery_and_passing_animal_is_not() {
         let plant = component(200, 50, 20);
-        let found: Vec<Vec<Component>> = (0..40)
+        let samples: Vec<Vec<Component>> = (0..40)
             .map(|k| {
                 let animal = component(4 * k, 90, 15);
                 if k % 2 == 0 {
@@ -89,13 +96,13 @@ mod tests {
             })
             .collect();
         let animal = vec![Some(0); 40];
-        assert!(is_scenery(&found, &animal, &found[0][1]));
-        assert!(!is_scenery(&found, &animal, &found[0][0]));
+        assert!(is_scenery(&samples, &animal, &samples[0][1]));
+        assert!(!is_scenery(&samples, &animal, &samples[0][0]));
     }
 
     #[test]
-    fn an_animal_asleep_is_not_scenery() {
-        let found: Vec<Vec<Component>> = (0..40u32)
+    fn sleeping_animal_is_not_scenery() {
+        let samples: Vec<Vec<Component>> = (0..40u32)
             .map(|k| {
                 vec![if k < 20 {
                     component(100, 50, 20)
@@ -104,6 +111,6 @@ mod tests {
                 }]
             })
             .collect();
-        assert!(!is_scenery(&found, &vec![Some(0); 40], &found[0][0]));
+        assert!(!is_scenery(&samples, &vec![Some(0); 40], &samples[0][0]));
     }
 }

@@ -7,46 +7,39 @@
 
 use rayon::prelude::*;
 
-use super::plate::Plate;
+use super::background::Background;
+use super::ghost;
+use super::light::Light;
 use super::samples::Samples;
 use super::scenery;
 use crate::analysis::silhouette::{self, shadow, tether};
 use crate::analysis::subject::{Color, LEAST_AREA_PX, Look, Subject, touches_border};
-use crate::geometry::Rect;
 use crate::order;
+use crate::raster::Frame;
 use crate::raster::runs::{Component, Run};
-use crate::raster::{Frame, Mask, RgbImage};
-
-use super::light::Light;
 
 /// Number of components kept per sample, largest first; further ones are noise. Free choice.
-const MOST_COMPONENTS: usize = 24;
+const MAX_COMPONENTS: usize = 24;
 
 /// Samples that must show a ghost at one place. If it touches the animal, both move as one component.
-pub(super) const GHOST_SAMPLES: usize = 3;
-
-/// Gap between a component and its surroundings, pixels, because its rim is blurred. Free choice.
-const MARGIN_PX: u32 = 2;
-/// Least width of the surroundings, pixels. Large components use a quarter of the root of their area. Free
-/// choice.
-const RING_PX: u32 = 6;
+pub(super) const MIN_GHOST_SAMPLES: usize = 3;
 
 /// Share of the animal's sightings that must show a tether, 0..=1. Free choice.
-const TETHERED: f64 = 0.5;
+const MIN_TETHERED_SHARE: f64 = 0.5;
 /// A tether ends at a fixed place if the spread of its ends is below this share of the animal's spread. The
 /// background may hide the rest of such a tether. Free choice.
-const ANCHORED: f64 = 0.4;
+const MAX_END_SPREAD: f64 = 0.4;
 
 /// The components of every sample that differ from its background; a sample without a background has none.
 pub(super) struct Survey {
     /// Components of each sample, largest first.
-    pub(super) found: Vec<Vec<Component>>,
-    /// Appearance of each component of `found`.
+    pub(super) components: Vec<Vec<Component>>,
+    /// Appearance of each of the components.
     pub(super) looks: Vec<Vec<Look>>,
     /// Typical appearance of the animal; `None` where no component can be the animal.
     pub(super) subject: Option<Subject>,
-    /// How well the subject explains the samples (`Subject::worth`); 0 without a subject.
-    pub(super) worth: f64,
+    /// How well the subject explains the samples (`Subject::score`); 0 without a subject.
+    pub(super) score: f64,
     /// Half the width below which a part of a component is thin, pixels (`silhouette::tether`). `None`
     /// without a tether. With one, tethers are components of their own.
     pub(super) tether_px: Option<u32>,
@@ -59,76 +52,68 @@ pub(super) struct Survey {
 }
 
 impl Survey {
-    /// Compares every sample with its background. The light of the samples must be equalized. If the animal
-    /// has a tether, cuts it off and repeats the survey.
-    pub(super) fn of(samples: &Samples, plates: &[Plate], plate_of: &[Option<usize>]) -> Survey {
-        let of_sample = |k: usize| {
-            let plate = plate_of[k].map(|at| &plates[at]);
-            plate.map_or(Vec::new(), |plate| {
-                silhouette::components(&samples.frames[k], plate, &Light::SAME, &samples.ignored[k])
-            })
+    /// Compares every sample with its background in `backgrounds`. The light of the samples must be equalized.
+    /// If the animal has a tether, cuts it off and repeats the survey.
+    pub(super) fn new(samples: &Samples, backgrounds: &[Option<&Background>]) -> Survey {
+        let components_of = |k: usize| match backgrounds[k] {
+            Some(background) => {
+                let (frame, ignored) = (&samples.frames[k], &samples.ignored[k]);
+                silhouette::components(frame, background, &Light::NEUTRAL, ignored)
+            }
+            None => Vec::new(),
         };
         let found: Vec<Vec<Component>> = (0..samples.frames.len())
             .into_par_iter()
-            .map(of_sample)
+            .map(components_of)
             .collect();
-        let whole = Survey::of_components(found.clone(), samples, plates, plate_of);
+        let whole = Survey::from_components(found.clone(), samples, backgrounds);
         if samples.are_masked() {
             return whole;
         }
         let Some(thin_px) = whole.thin_px(samples) else {
             return whole;
         };
-        let first = &samples.frames[0];
-        let cut = |components: Vec<Component>| {
-            let picture = [first.width, first.height];
-            let cut = |component| tether::cut_all(component, thin_px, picture);
-            components.into_iter().flat_map(cut).collect()
-        };
+        let cut = |component| tether::cut_all(component, thin_px, samples.size_px());
+        let without_tether = found
+            .into_iter()
+            .map(|c| c.into_iter().flat_map(cut).collect());
         Survey {
             tether_px: Some(thin_px),
-            ..Survey::of_components(
-                found.into_iter().map(cut).collect(),
-                samples,
-                plates,
-                plate_of,
-            )
+            ..Survey::from_components(without_tether.collect(), samples, backgrounds)
         }
     }
 
-    fn of_components(
+    fn from_components(
         mut found: Vec<Vec<Component>>,
         samples: &Samples,
-        plates: &[Plate],
-        plate_of: &[Option<usize>],
+        backgrounds: &[Option<&Background>],
     ) -> Survey {
         for components in &mut found {
             components.retain(|c| c.area >= LEAST_AREA_PX);
             components.sort_by_key(|c| std::cmp::Reverse(c.area));
-            components.truncate(MOST_COMPONENTS);
+            components.truncate(MAX_COMPONENTS);
         }
         let looks_of = |(k, components): (usize, &Vec<Component>)| {
-            let plate = plate_of[k].map(|at| &plates[at]);
             let looks = components
                 .iter()
-                .filter_map(|c| Some(look(&samples.frames[k], plate?, c)));
+                .filter_map(|c| Some(measure(&samples.frames[k], backgrounds[k]?, c)));
             looks.collect()
         };
         let mut looks: Vec<Vec<Look>> = found.par_iter().enumerate().map(looks_of).collect();
         let pinned = samples.pinned.and_then(|(k, point_px)| {
-            let at = nearest_to(&found[k], point_px)?;
+            let at = nearest_component(&found[k], point_px)?;
             Some((k, at))
         });
         let subject = Subject::learn(&looks, pinned);
-        for (k, (looks, components)) in looks.iter_mut().zip(&found).enumerate() {
+        for ((looks, components), background) in looks.iter_mut().zip(&found).zip(backgrounds) {
             for (look, component) in looks.iter_mut().zip(components) {
+                let shows_animal = |background: &Background, subject: &Subject| {
+                    subject.prefers(&Color::in_component(&background.rgb, component), look)
+                };
                 look.is_ghost = look.is_ghost
-                    && scenery::recurs(&found, component, GHOST_SAMPLES)
-                    && plate_of[k]
-                        .zip(subject.as_ref())
-                        .is_some_and(|(at, subject)| {
-                            subject.prefers(&color_in(&plates[at].rgb, component), look)
-                        });
+                    && scenery::recurs_exactly(&found, component, MIN_GHOST_SAMPLES)
+                    && (background.zip(subject.as_ref()))
+                        .is_some_and(|(background, subject)| shows_animal(background, subject));
             }
         }
         let mut animal = match &subject {
@@ -139,13 +124,13 @@ impl Survey {
             animal[k] = Some(at);
         }
         Survey {
-            worth: subject
+            score: subject
                 .as_ref()
-                .map_or(0.0, |subject| subject.worth(&looks)),
+                .map_or(0.0, |subject| subject.score(&looks)),
             tether_px: None,
             is_masked: samples.are_masked(),
             is_pinned: pinned.is_some(),
-            found,
+            components: found,
             looks,
             subject,
             animal,
@@ -156,11 +141,10 @@ impl Survey {
     /// tether is a thin part that reaches the border or always ends at one place. The end of a tail moves
     /// with the animal.
     fn thin_px(&self, samples: &Samples) -> Option<u32> {
-        let first = &samples.frames[0];
-        let picture = [first.width, first.height];
+        let picture = samples.size_px();
         let animals = self.animal.iter().enumerate();
         let animals: Vec<&Component> = animals
-            .filter_map(|(k, at)| Some(&self.found[k][(*at)?]))
+            .filter_map(|(k, at)| Some(&self.components[k][(*at)?]))
             .collect();
         let thin_px = order::median(animals.iter().map(|c| f64::from(tether::thin_px(c))))? as u32;
         let cut = |whole: &&Component| tether::cut(whole, thin_px, picture);
@@ -174,67 +158,68 @@ impl Survey {
             .iter()
             .map(|[animal, _]| animal.centroid_px())
             .collect();
-        let is_anchored = spread_px(&ends) < ANCHORED * spread_px(&places);
+        let is_anchored = spread_px(&ends) < MAX_END_SPREAD * spread_px(&places);
         let n_tethered = if is_anchored { parts.len() } else { n_led };
-        (n_tethered as f64 > TETHERED * animals.len() as f64).then_some(thin_px)
+        (n_tethered as f64 > MIN_TETHERED_SHARE * animals.len() as f64).then_some(thin_px)
     }
 
-    /// Returns the subject's worth over the root of its area, and so without its size. A threshold that is
+    /// Returns the subject's score over the root of its area, and so without its size. A threshold that is
     /// too low enlarges the animal by scenery.
     pub(super) fn starkness(&self) -> f64 {
         let area_px = self.subject.as_ref().map_or(1.0, Subject::area_px);
-        self.worth / area_px.sqrt()
+        self.score / area_px.sqrt()
     }
 
     /// Returns the total area of the components of a sample, pixels: the median over the samples.
     pub(super) fn differing_px(&self) -> f64 {
-        let of = |looks: &Vec<Look>| looks.iter().map(|look| look.area_px).sum::<f64>();
-        order::median(self.looks.iter().map(of)).unwrap_or(0.0)
+        let area_px = |looks: &Vec<Look>| looks.iter().map(|look| look.area_px).sum::<f64>();
+        order::median(self.looks.iter().map(area_px)).unwrap_or(0.0)
     }
 
     /// Returns whether component `at` of sample `k` is swaying scenery; always false with masks.
     pub(super) fn is_scenery(&self, k: usize, at: usize) -> bool {
-        !self.is_masked && scenery::is_scenery(&self.found, &self.animal, &self.found[k][at])
+        !self.is_masked
+            && scenery::is_scenery(&self.components, &self.animal, &self.components[k][at])
     }
 
     /// Returns the least area of a moving object, pixels: 0.3 of the subject's, but at least `LEAST_AREA_PX`.
     pub(super) fn least_area_px(&self) -> u64 {
-        let of = |subject: &Subject| (0.3 * subject.area_px()) as u64;
-        self.subject.as_ref().map_or(0, of).max(LEAST_AREA_PX)
+        let share_of = |subject: &Subject| (0.3 * subject.area_px()) as u64;
+        self.subject.as_ref().map_or(0, share_of).max(LEAST_AREA_PX)
     }
 }
 
 /// Returns the median distance of points from their coordinate-wise median, pixels.
 fn spread_px(points: &[[f64; 2]]) -> f64 {
     let middle = [0, 1].map(|axis| order::median(points.iter().map(|p| p[axis])).unwrap_or(0.0));
-    let off = points
+    let distances = points
         .iter()
         .map(|p| libm::hypot(p[0] - middle[0], p[1] - middle[1]));
-    order::median(off).unwrap_or(0.0)
+    order::median(distances).unwrap_or(0.0)
 }
 
-fn look(frame: &Frame, plate: &Plate, component: &Component) -> Look {
-    let difference = silhouette::difference(frame, plate, &Light::SAME, component.rect);
+fn measure(frame: &Frame, background: &Background, component: &Component) -> Look {
+    let difference = silhouette::difference(frame, background, &Light::NEUTRAL, component.rect);
     let picture = [frame.width, frame.height];
-    let look = Look::of(
+    let look = Look::measure(
         component,
         &difference.rgb,
         &difference.levels,
         picture,
-        plate.light,
+        background.light,
     );
     if frame.mask.is_some() {
         return look;
     }
     Look {
-        is_shadow: shadow::is_shadow_alone(&difference, plate, component),
-        is_ghost: is_ghost(frame, plate, component),
+        is_shadow: shadow::is_all_shadow(&difference, background, component),
+        is_ghost: ghost::is_ghost(frame, background, component),
         ..look
     }
 }
 
 /// Returns the component at the point, or else the nearest one no farther away than its box is long.
-fn nearest_to(components: &[Component], point_px: [f64; 2]) -> Option<usize> {
+fn nearest_component(components: &[Component], point_px: [f64; 2]) -> Option<usize> {
     let gap_px = |component: &Component| {
         let rect = component.rect;
         let beyond = |v: f64, from: u32, to: u32| (f64::from(from) - v).max(v - f64::from(to));
@@ -257,143 +242,4 @@ fn nearest_to(components: &[Component], point_px: [f64; 2]) -> Option<usize> {
         let ((out_a, gap_a), (out_b, gap_b)) = (rank(a), rank(b));
         out_a.cmp(&out_b).then(gap_a.total_cmp(&gap_b))
     })
-}
-
-/// Returns the color of a picture inside a component.
-pub(super) fn color_in(picture: &RgbImage, component: &Component) -> Color {
-    let row = |run: &Run| {
-        let first = run.y as usize * picture.width as usize;
-        picture.pixels[3 * (first + run.x0 as usize)..3 * (first + run.x1 as usize)].chunks(3)
-    };
-    Color::of(component.runs.iter().flat_map(row))
-}
-
-/// Returns whether the background shows an object that the frame does not. The sum of two measures decides,
-/// each from -1 to 1 and positive for an object in the frame. One compares gradients along the outline
-/// (docs/explanation/algorithms.md, "Background"), the other colors. The outline counts less where the
-/// texture around it is stronger, as for a smooth mouse on rough bedding.
-fn is_ghost(frame: &Frame, plate: &Plate, component: &Component) -> bool {
-    let surroundings = Surroundings::of(frame, component);
-    let [texture, of_frame, of_plate] = surroundings.gradients(frame, &plate.frame);
-    let outline = (of_frame.max(of_plate) - texture).max(0.0);
-    let share = outline / (outline + texture).max(1e-9);
-    let behind = color_in(&plate.rgb, component);
-    let [inside, around] = surroundings.colors(frame);
-    let by_color = contrast(inside.distance(&around), behind.distance(&around));
-    share * contrast(of_frame, of_plate) + (1.0 - share) * by_color < 0.0
-}
-
-/// A component and a ring around it, as pixel indices into one box.
-struct Surroundings {
-    rect: Rect,
-    /// The pixels of the component.
-    inside: Mask,
-    /// The outermost pixels of the component.
-    outline: Vec<usize>,
-    /// The pixels of the ring, which begins `MARGIN_PX` outside the component.
-    around: Vec<usize>,
-}
-
-impl Surroundings {
-    fn of(frame: &Frame, component: &Component) -> Surroundings {
-        let away_px = MARGIN_PX + RING_PX.max((component.area as f64).sqrt() as u32 / 4);
-        let rect = component.rect.inflated(away_px, frame.width, frame.height);
-        let inside = component.mask(rect);
-        let inner = inside.eroded();
-        let (near, far) = (inside.dilated_by(MARGIN_PX), inside.dilated_by(away_px));
-        let chosen = |is_chosen: &dyn Fn(usize) -> bool| {
-            (0..inside.bits.len()).filter(|&k| is_chosen(k)).collect()
-        };
-        Surroundings {
-            rect,
-            outline: chosen(&|k| inside.bits[k] == 1 && inner.bits[k] == 0),
-            around: chosen(&|k| far.bits[k] == 1 && near.bits[k] == 0),
-            inside,
-        }
-    }
-
-    /// Returns mean gradients of the background in the ring, and of frame and background on the outline.
-    fn gradients(&self, frame: &Frame, plate: &Frame) -> [f64; 3] {
-        let (w, h) = (frame.width as usize, frame.height as usize);
-        let gradient = |luma: &[u8], k: usize| {
-            let x = self.rect.x as usize + k % self.inside.width();
-            let y = self.rect.y as usize + k / self.inside.width();
-            let at = |x: usize, y: usize| f64::from(luma[y * w + x]);
-            let dx = at((x + 1).min(w - 1), y) - at(x.saturating_sub(1), y);
-            let dy = at(x, (y + 1).min(h - 1)) - at(x, y.saturating_sub(1));
-            dx.abs() + dy.abs()
-        };
-        let mean = |luma: &[u8], pixels: &[usize]| {
-            let sum: f64 = pixels.iter().map(|&k| gradient(luma, k)).sum();
-            sum / pixels.len().max(1) as f64
-        };
-        [
-            mean(plate.luma(), &self.around),
-            mean(frame.luma(), &self.outline),
-            mean(plate.luma(), &self.outline),
-        ]
-    }
-
-    /// Returns the colors of the frame inside the component and in the ring.
-    fn colors(&self, frame: &Frame) -> [Color; 2] {
-        let rgb = frame.rgb(self.rect);
-        let inside = (0..self.inside.bits.len()).filter(|&k| self.inside.bits[k] == 1);
-        let pixel = |k: usize| &rgb.pixels[3 * k..3 * k + 3];
-        [
-            Color::of(inside.map(pixel)),
-            Color::of(self.around.iter().map(|&k| pixel(k))),
-        ]
-    }
-}
-
-/// Returns (a - b) / (a + b), -1..=1, for two quantities that are not negative.
-fn contrast(a: f64, b: f64) -> f64 {
-    (a - b) / (a + b).max(1e-9)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::random;
-    use crate::raster::ColorSpec;
-    use crate::raster::runs::components;
-
-    const SIZE: u32 = 80;
-
-    /// Returns the share of a pixel that a disc with a soft edge covers, 0..=1.
-    fn in_disc(x: u32, y: u32) -> f64 {
-        let distance_px = libm::hypot(f64::from(x) - 40.0, f64::from(y) - 40.0);
-        ((20.0 - distance_px) / 6.0).clamp(0.0, 1.0)
-    }
-
-    /// Returns a scene of two-pixel chips with levels in the given range, with or without a smooth dark disc
-    /// on top.
-    fn frame([darkest, brightest]: [f64; 2], has_disc: bool) -> Frame {
-        let mut picture = RgbImage::new(SIZE, SIZE);
-        for (y, x) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (y, x))) {
-            let chip = random::uniform(3, &[u64::from(x / 2), u64::from(y / 2)]);
-            let level = darkest + (brightest - darkest) * chip;
-            let covered = if has_disc { in_disc(x, y) } else { 0.0 };
-            let level = covered * 40.0 + (1.0 - covered) * level;
-            picture.set_pixel(x, y, [level as u8; 3]);
-        }
-        let mut frame = Frame::new(SIZE, SIZE, ColorSpec::default());
-        frame.draw_rgb(&picture, Rect::of_size(SIZE, SIZE));
-        frame
-    }
-
-    #[test]
-    fn a_smooth_animal_is_no_ghost_however_rough_the_scene_behind_it() {
-        let mut mask = Mask::new(Rect::of_size(SIZE, SIZE));
-        for (at, bit) in (0..).zip(&mut mask.bits) {
-            *bit = u8::from(in_disc(at % SIZE, at / SIZE) > 0.3);
-        }
-        let disc = &components(&mask)[0];
-        for levels in [[180.0, 190.0], [60.0, 250.0]] {
-            let [empty, with_disc] = [false, true].map(|has_disc| frame(levels, has_disc));
-            let plate = |frame: &Frame| Plate::without_noise(frame.clone(), 12);
-            assert!(!is_ghost(&with_disc, &plate(&empty), disc), "{levels:?}");
-            assert!(is_ghost(&empty, &plate(&with_disc), disc), "{levels:?}");
-        }
-    }
 }

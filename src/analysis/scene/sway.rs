@@ -10,31 +10,34 @@ use rayon::prelude::*;
 use crate::raster::{Frame, RgbImage};
 
 /// Least difference from the background that shows another color, levels of 255. Free choice.
-const CLEARLY: u8 = 12;
+const MIN_DIFFERENCE: u8 = 12;
 /// Least number of samples that must show the other color. Free choice.
-const OFTEN: usize = 3;
+const MIN_SAMPLES: usize = 3;
 /// Difference below which two values are equal, levels of 255. Free choice.
-const SAME: u8 = 10;
+const SAME_LEVELS: u8 = 10;
 /// Largest distance that scenery moves, as a share of the picture's width. Free choice.
-const REACH: f64 = 1.0 / 40.0;
+const MAX_DISTANCE: f64 = 1.0 / 40.0;
 
 /// Returns the background in RGB with the second color at every pixel that scenery sways across. Returns
 /// `None` if nothing sways. `free` returns the samples in which a pixel shows the scene, one bit each.
 pub(super) fn other_color(
     samples: &[Frame],
-    plate: &Frame,
+    background: &Frame,
     free: impl Fn(usize) -> u64 + Sync,
 ) -> Option<RgbImage> {
-    let width = plate.width as usize;
-    let rows: Vec<Vec<(usize, usize)>> = (0..plate.height as usize)
+    let width = background.width as usize;
+    let rows: Vec<Vec<(usize, usize)>> = (0..background.height as usize)
         .into_par_iter()
         .map(|y| {
-            let counts = times_different(samples, plate, y);
-            let places = (0..width).filter(|&x| usize::from(counts[x]) >= OFTEN);
-            places
+            let counts = times_different(samples, background, y);
+            let value_indices = (0..width).filter(|&x| usize::from(counts[x]) >= MIN_SAMPLES);
+            value_indices
                 .filter_map(|x| {
                     let px = y * width + x;
-                    Some((px, sample_of_other(samples, plate, px, free(px))?))
+                    Some((
+                        px,
+                        sample_of_other_color(samples, background, px, free(px))?,
+                    ))
                 })
                 .collect()
         })
@@ -42,9 +45,9 @@ pub(super) fn other_color(
     if rows.iter().all(Vec::is_empty) {
         return None;
     }
-    let mut other = plate.clone();
+    let mut other = background.clone();
     for &(px, sample) in rows.iter().flatten() {
-        for at in places(plate, px) {
+        for at in value_indices(background, px) {
             other.planes[at] = samples[sample].planes[at];
         }
     }
@@ -52,30 +55,30 @@ pub(super) fn other_color(
 }
 
 /// Returns whether the background shows a pixel's color within the distance that scenery moves.
-pub(super) fn is_displaced(frame: &Frame, plate: &Frame, px: usize) -> bool {
-    let color = places(frame, px).map(|at| frame.planes[at]);
-    let (w, h) = (plate.width as usize, plate.height as usize);
-    let reach = ((REACH * w as f64) as usize).max(4);
+pub(super) fn occurs_nearby(frame: &Frame, background: &Frame, px: usize) -> bool {
+    let color = value_indices(frame, px).map(|at| frame.planes[at]);
+    let (w, h) = (background.width as usize, background.height as usize);
+    let reach = ((MAX_DISTANCE * w as f64) as usize).max(4);
     let (x, y) = (px % w, px / w);
     let rows = y.saturating_sub(reach)..(y + reach + 1).min(h);
     let columns = x.saturating_sub(reach)..(x + reach + 1).min(w);
     rows.into_iter().any(|row| {
         columns.clone().any(|column| {
-            plate.planes[row * w + column].abs_diff(color[0]) < SAME && {
-                let there = places(plate, row * w + column);
-                (1..3).all(|k| plate.planes[there[k]].abs_diff(color[k]) < SAME)
+            background.planes[row * w + column].abs_diff(color[0]) < SAME_LEVELS && {
+                let there = value_indices(background, row * w + column);
+                (1..3).all(|k| background.planes[there[k]].abs_diff(color[k]) < SAME_LEVELS)
             }
         })
     })
 }
 
 /// Returns for each pixel of a row the number of samples that differ clearly in luma or chroma.
-fn times_different(samples: &[Frame], plate: &Frame, y: usize) -> Vec<u8> {
-    let width = plate.width as usize;
-    let chroma_width = plate.chroma_width() as usize;
+fn times_different(samples: &[Frame], background: &Frame, y: usize) -> Vec<u8> {
+    let width = background.width as usize;
+    let chroma_width = background.chroma_width() as usize;
     let (n_luma, n_chroma) = (
-        plate.luma().len(),
-        (plate.planes.len() - plate.luma().len()) / 2,
+        background.luma().len(),
+        (background.planes.len() - background.luma().len()) / 2,
     );
     let u = n_luma + y / 2 * chroma_width;
     let mut counts = vec![0u8; width];
@@ -84,16 +87,16 @@ fn times_different(samples: &[Frame], plate: &Frame, y: usize) -> Vec<u8> {
         let row = |start: usize, n: usize| {
             (
                 &sample.planes[start..start + n],
-                &plate.planes[start..start + n],
+                &background.planes[start..start + n],
             )
         };
         let ((su, pu), (sv, pv)) = (row(u, chroma_width), row(u + n_chroma, chroma_width));
         for (k, flag) in chroma.iter_mut().enumerate() {
-            *flag = u8::from(su[k].abs_diff(pu[k]).max(sv[k].abs_diff(pv[k])) >= CLEARLY);
+            *flag = u8::from(su[k].abs_diff(pu[k]).max(sv[k].abs_diff(pv[k])) >= MIN_DIFFERENCE);
         }
         let (sy, py) = row(y * width, width);
         for (x, count) in counts.iter_mut().enumerate() {
-            *count += u8::from(sy[x].abs_diff(py[x]) >= CLEARLY) | chroma[x / 2];
+            *count += u8::from(sy[x].abs_diff(py[x]) >= MIN_DIFFERENCE) | chroma[x / 2];
         }
     }
     counts
@@ -101,23 +104,30 @@ fn times_different(samples: &[Frame], plate: &Frame, y: usize) -> Vec<u8> {
 
 /// Returns the free sample with the third largest difference among those that show a displaced color. The two
 /// largest may be chance. Returns `None` if there are fewer.
-fn sample_of_other(samples: &[Frame], plate: &Frame, px: usize, free: u64) -> Option<usize> {
-    let at = places(plate, px);
+fn sample_of_other_color(
+    samples: &[Frame],
+    background: &Frame,
+    px: usize,
+    free: u64,
+) -> Option<usize> {
+    let at = value_indices(background, px);
     let gap = |k: usize| {
-        let of = |at: usize| samples[k].planes[at].abs_diff(plate.planes[at]);
-        of(at[0]).max(of(at[1])).max(of(at[2]))
+        let difference = |at: usize| samples[k].planes[at].abs_diff(background.planes[at]);
+        difference(at[0])
+            .max(difference(at[1]))
+            .max(difference(at[2]))
     };
     let mut shown: Vec<(u8, usize)> = (0..samples.len())
         .filter(|k| free >> k & 1 == 1)
         .map(|k| (gap(k), k))
-        .filter(|&(gap, k)| gap >= CLEARLY && is_displaced(&samples[k], plate, px))
+        .filter(|&(gap, k)| gap >= MIN_DIFFERENCE && occurs_nearby(&samples[k], background, px))
         .collect();
     shown.sort_unstable_by(|a, b| b.cmp(a));
-    shown.get(OFTEN - 1).map(|&(_, k)| k)
+    shown.get(MIN_SAMPLES - 1).map(|&(_, k)| k)
 }
 
 /// Returns the indices of a pixel's three values in the planes.
-fn places(frame: &Frame, px: usize) -> [usize; 3] {
+fn value_indices(frame: &Frame, px: usize) -> [usize; 3] {
     let (width, n_luma) = (frame.width as usize, frame.luma().len());
     let chroma = px / width / 2 * frame.chroma_width() as usize + px % width / 2;
     let n_chroma = (frame.planes.len() - n_luma) / 2;
@@ -148,19 +158,19 @@ mod tests {
     }
 
     #[test]
-    fn where_a_stalk_sways_its_color_is_known_and_a_resting_animal_is_not_scenery() {
+    fn swaying_stalk_gives_a_second_color_and_resting_animal_does_not() {
         let sways = |k: usize| if k.is_multiple_of(8) { 43 } else { 40 };
         let samples: Vec<Frame> = (0..32).map(|k| scene(sways(k), k % 4 == 1)).collect();
         let other = other_color(&samples, &scene(40, false), |_| u32::MAX.into());
         let other = other.expect("the stalk sways");
-        let plate = scene(40, false).to_rgb();
-        assert!(other.pixel(44, 10)[0] < plate.pixel(44, 10)[0] - 50);
-        assert_eq!(other.pixel(95, 25), plate.pixel(95, 25));
-        assert_eq!(other.pixel(20, 10), plate.pixel(20, 10));
+        let background = scene(40, false).to_rgb();
+        assert!(other.pixel(44, 10)[0] < background.pixel(44, 10)[0] - 50);
+        assert_eq!(other.pixel(95, 25), background.pixel(95, 25));
+        assert_eq!(other.pixel(20, 10), background.pixel(20, 10));
     }
 
     #[test]
-    fn where_nothing_sways_there_is_no_other_color() {
+    fn still_scene_has_no_second_color() {
         let samples: Vec<Frame> = (0..32).map(|k| scene(40, k % 4 == 1)).collect();
         assert!(other_color(&samples, &scene(40, false), |_| u32::MAX.into()).is_none());
     }

@@ -34,7 +34,7 @@ struct Picture {
 }
 
 impl Picture {
-    fn of(discs: Vec<Disc>) -> Picture {
+    fn with_discs(discs: Vec<Disc>) -> Picture {
         Picture {
             camera_px: [0.0; 2],
             light: 1.0,
@@ -144,37 +144,37 @@ fn swimmer(frame_idx: usize, turn: f64, radius_px: f64) -> Disc {
 }
 
 #[test]
-fn footage_in_which_nothing_moves_is_refused() {
-    let (code, sentence) = refusal(40, |_| Picture::of(vec![]));
+fn still_footage_is_refused() {
+    let (code, sentence) = refusal(40, |_| Picture::with_discs(vec![]));
     assert_eq!(code, Code::NothingMoves, "{sentence}");
 }
 
 #[test]
-fn footage_of_a_trembling_camera_is_refused() {
+fn trembling_camera_is_refused() {
     let (code, sentence) = refusal(40, |k| Picture {
         camera_px: [
             random::uniform(1, &[k as u64]) * 6.0,
             random::uniform(2, &[k as u64]) * 6.0,
         ],
-        ..Picture::of(vec![swimmer(k, 0.0, 9.0)])
+        ..Picture::with_discs(vec![swimmer(k, 0.0, 9.0)])
     });
     assert_eq!(code, Code::BackgroundNotStatic, "{sentence}");
 }
 
 #[test]
-fn footage_of_a_camera_that_pans_slowly_is_refused() {
+fn slowly_panning_camera_is_refused() {
     let (code, sentence) = refusal(40, |k| Picture {
         camera_px: [0.2 * k as f64, 0.0],
-        ..Picture::of(vec![swimmer(k, 0.0, 9.0)])
+        ..Picture::with_discs(vec![swimmer(k, 0.0, 9.0)])
     });
     assert_eq!(code, Code::BackgroundNotStatic, "{sentence}");
 }
 
 #[test]
-fn a_still_camera_in_changing_light_is_let_pass() {
+fn changing_light_is_accepted() {
     let library = analyzed(60, &Params::default(), |k| Picture {
         light: 1.0 + 0.15 * libm::sin(k as f64 * 0.3),
-        ..Picture::of(vec![swimmer(k, 0.0, 9.0)])
+        ..Picture::with_discs(vec![swimmer(k, 0.0, 9.0)])
     });
     assert_eq!(
         library.expect("the camera stands still").stats.n_detected,
@@ -183,8 +183,8 @@ fn a_still_camera_in_changing_light_is_let_pass() {
 }
 
 #[test]
-fn two_animals_are_refused_unless_the_largest_is_to_be_followed() {
-    let two = |k: usize| Picture::of(vec![swimmer(k, 0.0, 10.0), swimmer(k, 3.1, 8.0)]);
+fn two_animals_are_refused_unless_the_largest_is_followed() {
+    let two = |k: usize| Picture::with_discs(vec![swimmer(k, 0.0, 10.0), swimmer(k, 3.1, 8.0)]);
     let (code, sentence) = refusal(60, two);
     assert_eq!(code, Code::SeveralAnimals, "{sentence}");
     assert!(code.advice().contains("--follow-largest"));
@@ -201,8 +201,8 @@ fn two_animals_are_refused_unless_the_largest_is_to_be_followed() {
 }
 
 #[test]
-fn a_tiny_animal_is_tracked_but_has_no_sprites_unless_asked_for() {
-    let tiny = |k: usize| Picture::of(vec![swimmer(k, 0.0, 2.4)]);
+fn tiny_animal_has_sprites_only_on_request() {
+    let tiny = |k: usize| Picture::with_discs(vec![swimmer(k, 0.0, 2.4)]);
     let library = analyzed(60, &Params::default(), tiny).expect("it can be tracked");
     assert!(library.stats.animal_too_small && library.stats.n_detected > 50);
     assert!((0..60).all(|k| !library.sprites.is_present(k)));
@@ -217,14 +217,14 @@ fn a_tiny_animal_is_tracked_but_has_no_sprites_unless_asked_for() {
 }
 
 #[test]
-fn what_is_far_larger_than_the_animal_is_not_taken_for_it() {
+fn object_far_larger_than_the_animal_is_not_followed() {
     let shadow = Disc {
         center_px: [90.0, 70.0],
         radius_px: 55.0,
     };
     let picture = |k: usize| {
         let shown = if k < 3 { shadow } else { swimmer(k, 0.0, 8.0) };
-        Picture::of(vec![shown])
+        Picture::with_discs(vec![shown])
     };
     let library = analyzed(60, &Params::default(), picture).expect("it can be tracked");
     let found = |k: usize| library.poses.frames[k].detected();
@@ -232,8 +232,8 @@ fn what_is_far_larger_than_the_animal_is_not_taken_for_it() {
 }
 
 #[test]
-fn a_film_of_a_few_frames_is_refused() {
-    let (code, sentence) = refusal(12, |k| Picture::of(vec![swimmer(k, 0.0, 9.0)]));
+fn film_of_a_few_frames_is_refused() {
+    let (code, sentence) = refusal(12, |k| Picture::with_discs(vec![swimmer(k, 0.0, 9.0)]));
     assert_eq!(code, Code::TooFewFrames);
     assert_eq!(
         sentence,

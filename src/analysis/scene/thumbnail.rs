@@ -8,19 +8,19 @@ use crate::order;
 use crate::raster::Frame;
 
 /// Approximate number of cells along the longer side of the picture. Free choice.
-const ALONG: usize = 96;
-/// Luma difference above which a cell differs, levels of 255, in addition to `SHARE`. Free choice.
-const LEVELS: f32 = 6.0;
+const N_CELLS_ALONG: usize = 96;
+/// Luma difference above which a cell differs, levels of 255, in addition to `LUMA_SHARE`. Free choice.
+const LUMA_LEVELS: f32 = 6.0;
 /// Further luma difference allowed, as a share of the cell's luma. Free choice.
-const SHARE: f32 = 0.1;
+const LUMA_SHARE: f32 = 0.1;
 /// Chroma difference above which a cell differs, levels of 255. Free choice.
 const CHROMA_LEVELS: f32 = 8.0;
 /// Largest luma of a cell that is too dark to measure light, levels of 255. Free choice.
-const DARK: f32 = 12.0;
+const MAX_DARK_LUMA: f32 = 12.0;
 /// A picture is blank if its cells' luma varies by less than this, levels of 255. Free choice.
-const FLAT: f32 = 6.0;
+const MAX_BLANK_RANGE: f32 = 6.0;
 /// Largest gain of light between two thumbnails, as a factor up or down. Free choice.
-const MOST_GAIN: f32 = 4.0;
+const MAX_GAIN: f32 = 4.0;
 
 /// Means of Y (minus black), U and V (both minus 128) in square cells, row by row.
 #[derive(Clone, Debug)]
@@ -32,12 +32,12 @@ pub(super) struct Thumbnail {
 impl Thumbnail {
     /// Returns the side of a cell for a picture of this size, pixels; always even.
     pub(super) fn cell_px(width: u32, height: u32) -> usize {
-        let side = (width.max(height) as usize).div_ceil(ALONG);
+        let side = (width.max(height) as usize).div_ceil(N_CELLS_ALONG);
         (side + side % 2).max(4)
     }
 
     /// Returns the thumbnail of a frame.
-    pub(super) fn of(frame: &Frame) -> Thumbnail {
+    pub(super) fn new(frame: &Frame) -> Thumbnail {
         let side = Thumbnail::cell_px(frame.width, frame.height);
         let (w, h) = (frame.width as usize, frame.height as usize);
         let (columns, rows) = (w.div_ceil(side), h.div_ceil(side));
@@ -78,7 +78,7 @@ impl Thumbnail {
         let luma = || self.cells.iter().map(|cell| cell[0]);
         let most = luma().fold(f32::MIN, f32::max);
         let least = luma().fold(f32::MAX, f32::min);
-        most - least < FLAT
+        most - least < MAX_BLANK_RANGE
     }
 
     /// Returns the share of cells that differ from another thumbnail after its light is fitted, 0..=1.
@@ -111,9 +111,10 @@ impl Thumbnail {
             aa += p * p;
             bb += q * q;
         }
-        match aa * bb > 0.0 {
-            true => ab / (aa * bb).sqrt(),
-            false => 0.0,
+        if aa * bb > 0.0 {
+            ab / (aa * bb).sqrt()
+        } else {
+            0.0
         }
     }
 
@@ -147,7 +148,7 @@ impl Thumbnail {
     fn divide(&mut self, cells: impl Iterator<Item = usize> + Clone, other: &Thumbnail) {
         let ratio = |k: usize| {
             let (a, b) = (self.cells[k][0], other.cells[k][0]);
-            (a > DARK && b > DARK).then(|| f64::from(a / b))
+            (a > MAX_DARK_LUMA && b > MAX_DARK_LUMA).then(|| f64::from(a / b))
         };
         let n_cells = cells.clone().count();
         let mut ratios: Vec<f64> = cells.clone().filter_map(ratio).collect();
@@ -156,7 +157,7 @@ impl Thumbnail {
             return;
         }
         let gain = order::percentile(&mut ratios, 0.5).unwrap_or(1.0) as f32;
-        let gain = gain.clamp(1.0 / MOST_GAIN, MOST_GAIN);
+        let gain = gain.clamp(1.0 / MAX_GAIN, MAX_GAIN);
         for k in cells {
             self.cells[k][0] /= gain;
         }
@@ -164,7 +165,7 @@ impl Thumbnail {
 }
 
 fn cells_differ(a: &[f32; 3], b: &[f32; 3]) -> bool {
-    let luma = (a[0] - b[0]).abs() > LEVELS + SHARE * b[0].max(0.0);
+    let luma = (a[0] - b[0]).abs() > LUMA_LEVELS + LUMA_SHARE * b[0].max(0.0);
     luma || (1..3).any(|c| (a[c] - b[c]).abs() > CHROMA_LEVELS)
 }
 
@@ -181,9 +182,9 @@ fn cell_means(plane: &[u8], [w, h]: [usize; 2], side: usize) -> Vec<f32> {
                 *sum += cell.iter().map(|&v| u32::from(v)).sum::<u32>();
             }
         }
-        let n_in = |column: usize| (side.min(w - column * side) * lines.len()) as f32;
-        let of = |(column, sum): (usize, u32)| sum as f32 / n_in(column);
-        means.extend(sums.into_iter().enumerate().map(of));
+        let n_px = |column: usize| (side.min(w - column * side) * lines.len()) as f32;
+        let mean = |(column, sum): (usize, u32)| sum as f32 / n_px(column);
+        means.extend(sums.into_iter().enumerate().map(mean));
     }
     means
 }

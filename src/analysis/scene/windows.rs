@@ -1,37 +1,39 @@
-//! Splits a scene that changes for good into parts, one after the other in time. Examples are bedding kicked
-//! about, a toy pushed aside and light that dims slowly.
+//! Splits a scene that changes for good into groups of samples, one after the other in time. Examples are
+//! bedding kicked about, a toy pushed aside and light that dims slowly.
 //!
-//! A part is split where two backgrounds explain its samples much better than one. Thumbnails measure this,
-//! without the cells that the animal covers. The module also cuts parts into short windows of equal size.
+//! A group is split where two backgrounds explain its samples much better than one. Thumbnails measure this,
+//! without the cells that the animal covers. The module also cuts groups into short windows of equal size.
 
-use super::states::{LEAST_SAMPLES, Part, bits};
+use super::samples::indices;
+use super::states::{MIN_SAMPLES, SampleGroup};
 use super::thumbnail::Thumbnail;
 
 /// Share of differing cells below which one background is enough, 0..=1. Free choice.
-const GOOD: f64 = 0.004;
+const GOOD_SHARE: f64 = 0.004;
 /// Largest ratio of differing cells after a split to those before it. Free choice.
-const BETTER: f64 = 0.65;
+const MAX_SPLIT_RATIO: f64 = 0.65;
 
-/// Least share of a part's samples on each side of a split, 0..=1. A shorter change is a passing object. Free
+/// Least share of a group's samples on each side of a split, 0..=1. A shorter change is a passing object. Free
 /// choice.
-const FOR_GOOD: f64 = 0.33;
+const MIN_SPLIT_SHARE: f64 = 0.33;
 
 /// Target number of samples in a short window. Free choice.
-const SHORT: usize = 8;
+const SAMPLES_PER_WINDOW: usize = 8;
 
-/// Splits a part in time, recursively, while a split explains the samples much better. `is_free(k, cell)`
+/// Splits a group in time, recursively, while a split explains the samples much better. `is_free(k, cell)`
 /// tells whether sample `k` shows the scene at a thumbnail cell. Returns the pieces in order of time.
 pub(super) fn split(
-    part: Part,
+    group: SampleGroup,
     thumbnails: &[Thumbnail],
     is_free: &impl Fn(usize, usize) -> bool,
-) -> Vec<Part> {
-    let members: Vec<usize> = bits(part.samples).collect();
-    let least = (LEAST_SAMPLES as usize).max((FOR_GOOD * members.len() as f64).ceil() as usize);
+) -> Vec<SampleGroup> {
+    let members: Vec<usize> = indices(group.samples).collect();
+    let least =
+        (MIN_SAMPLES as usize).max((MIN_SPLIT_SHARE * members.len() as f64).ceil() as usize);
     let whole = unexplained(&members, thumbnails, is_free);
     let n_cells = thumbnails[members[0]].len();
-    if members.len() < 2 * least || (whole as f64) < GOOD * (n_cells * members.len()) as f64 {
-        return vec![part];
+    if members.len() < 2 * least || (whole as f64) < GOOD_SHARE * (n_cells * members.len()) as f64 {
+        return vec![group];
     }
     let places = (least..=members.len() - least).step_by((members.len() / 8).max(1));
     let with_rest = places.map(|at| {
@@ -41,33 +43,33 @@ pub(super) fn split(
         (rest, at)
     });
     let Some((rest, at)) = with_rest.min() else {
-        return vec![part];
+        return vec![group];
     };
-    if rest as f64 > BETTER * whole as f64 {
-        return vec![part];
+    if rest as f64 > MAX_SPLIT_RATIO * whole as f64 {
+        return vec![group];
     }
-    let of = |members: &[usize]| Part {
+    let group_of = |members: &[usize]| SampleGroup {
         samples: members.iter().fold(0, |mask, k| mask | 1 << k),
-        ..part
+        ..group
     };
     let (before, after) = members.split_at(at);
     [before, after]
         .into_iter()
-        .flat_map(|half| split(of(half), thumbnails, is_free))
+        .flat_map(|half| split(group_of(half), thumbnails, is_free))
         .collect()
 }
 
-/// Splits a part into short time windows with about equally many samples each, in order of time. They are so
+/// Splits a group into short time windows with about equally many samples each, in order of time. They are so
 /// short that a moving animal rarely enters their median.
-pub(super) fn short(part: Part) -> Vec<Part> {
-    let members: Vec<usize> = bits(part.samples).collect();
-    let n_windows = (members.len() / SHORT).max(1);
-    let of = |k: usize| {
+pub(super) fn short_windows(group: SampleGroup) -> Vec<SampleGroup> {
+    let members: Vec<usize> = indices(group.samples).collect();
+    let n_windows = (members.len() / SAMPLES_PER_WINDOW).max(1);
+    let window = |k: usize| {
         let range = k * members.len() / n_windows..(k + 1) * members.len() / n_windows;
         let samples = members[range].iter().fold(0, |mask, k| mask | 1 << k);
-        Part { samples, ..part }
+        SampleGroup { samples, ..group }
     };
-    (0..n_windows).map(of).collect()
+    (0..n_windows).map(window).collect()
 }
 
 /// Returns the number of free cells, over all members, that differ from the members' median thumbnail.
@@ -77,9 +79,9 @@ fn unexplained(
     is_free: &impl Fn(usize, usize) -> bool,
 ) -> usize {
     let typical = Thumbnail::median(members.iter().map(|&k| &thumbnails[k]));
-    let of = |&k: &usize| {
+    let n_differing = |&k: &usize| {
         let differs = |cell: &usize| is_free(k, *cell) && thumbnails[k].differs_at(&typical, *cell);
         (0..typical.len()).filter(differs).count()
     };
-    members.iter().map(of).sum()
+    members.iter().map(n_differing).sum()
 }

@@ -31,15 +31,15 @@ pub struct Blocks {
 
 impl Blocks {
     /// Returns the block sums of a background image, with the least thresholds.
-    pub fn of(plate: &Frame) -> Blocks {
-        let (columns, rows) = grid(plate);
+    pub fn new(background: &Frame) -> Blocks {
+        let (columns, rows) = grid(background);
         let mut sums = vec![[0; 3]; columns * rows];
         for (row, sums) in sums.chunks_exact_mut(columns).enumerate() {
-            block_row(plate, row, sums);
+            block_row(background, row, sums);
         }
         let least = [LUMA_LEVELS * 16, CHROMA_LEVELS * 4, CHROMA_LEVELS * 4].map(|t| t as i16);
         let thresholds = vec![least; sums.len()];
-        let black = if plate.color.range == Range::Limited {
+        let black = if background.color.range == Range::Limited {
             16.0 * 16.0
         } else {
             0.0
@@ -56,27 +56,28 @@ impl Blocks {
     /// Raises each block's thresholds to four times its noise.
     ///
     /// The noise is 1.4826 times the median absolute deviation from the background, over the samples in which
-    /// nothing covers the block. `part` selects the samples, one bit each. `taken` has one word per block:
+    /// nothing covers the block. `group` selects the samples, one bit each. `taken` has one word per block:
     /// its bit k is set when something covers the block in sample k.
-    pub fn measure_noise(&mut self, samples: &[Frame], part: u64, taken: &[u64]) {
-        let plate = self.sums.par_chunks_exact(self.columns);
+    pub fn measure_noise(&mut self, samples: &[Frame], group: u64, taken: &[u64]) {
+        let background = self.sums.par_chunks_exact(self.columns);
         let rows = self
             .thresholds
             .par_chunks_exact_mut(self.columns)
-            .zip(plate)
+            .zip(background)
             .zip(taken.par_chunks_exact(self.columns));
         rows.enumerate()
-            .for_each(|(row, ((thresholds, plate), taken))| {
+            .for_each(|(row, ((thresholds, background), taken))| {
                 let members: Vec<usize> =
-                    (0..samples.len()).filter(|k| part >> k & 1 == 1).collect();
-                let of = |&k: &usize| {
-                    let mut sums = vec![[0; 3]; plate.len()];
+                    (0..samples.len()).filter(|k| group >> k & 1 == 1).collect();
+                let sums_of = |&k: &usize| {
+                    let mut sums = vec![[0; 3]; background.len()];
                     block_row(&samples[k], row, &mut sums);
                     sums
                 };
-                let sums: Vec<Vec<[i16; 3]>> = members.iter().map(of).collect();
+                let sums: Vec<Vec<[i16; 3]>> = members.iter().map(sums_of).collect();
                 let mut gaps = Vec::with_capacity(members.len());
-                for (column, (threshold, base)) in thresholds.iter_mut().zip(plate).enumerate() {
+                for (column, (threshold, base)) in thresholds.iter_mut().zip(background).enumerate()
+                {
                     for plane in 0..3 {
                         let free = members.iter().zip(&sums);
                         let free = free.filter(|(k, _)| taken[column] >> **k & 1 == 0);
@@ -104,9 +105,14 @@ impl Blocks {
         let differing = self.differing(frame, light);
         let n_differing: u64 = differing.iter().map(|c| c.area).sum();
         let share = n_differing as f64 / self.sums.len() as f64;
-        let near = |rect: &Rect| rect.inflated(margin_px, width, height);
+        let widened = |rect: &Rect| rect.inflated(margin_px, width, height);
         (
-            joined(differing.iter().map(|c| near(&pixels_of(c.rect))).collect()),
+            merge_overlapping(
+                differing
+                    .iter()
+                    .map(|c| widened(&box_in_pixels(c.rect)))
+                    .collect(),
+            ),
             share,
         )
     }
@@ -115,8 +121,8 @@ impl Blocks {
     fn differing(&self, frame: &Frame, light: &Light) -> Vec<Component> {
         let mut mask = Mask::new(Rect::of_size(self.columns as u32, self.rows as u32));
         let mut sums = vec![[0; 3]; self.columns];
-        let to_plate = 1024.0 / light.luma();
-        let even = to_plate.round() as i32;
+        let inverse_gain = 1024.0 / light.luma();
+        let even = inverse_gain.round() as i32;
         let black = self.black as i32;
         let middle = |at: usize| at * SIDE + SIDE / 2;
         let (last_x, last_y) = (frame.width as usize - 1, frame.height as usize - 1);
@@ -126,12 +132,11 @@ impl Blocks {
             for (column, (bit, sum)) in bits.iter_mut().zip(&sums).enumerate() {
                 let (base, threshold) =
                     (&self.sums[first + column], &self.thresholds[first + column]);
-                let factor = match light.is_uneven() {
-                    false => even,
-                    true => {
-                        let (x, y) = (middle(column).min(last_x), middle(row).min(last_y));
-                        (to_plate / light.factor(x, y)).round() as i32
-                    }
+                let factor = if light.is_uneven() {
+                    let (x, y) = (middle(column).min(last_x), middle(row).min(last_y));
+                    (inverse_gain / light.factor(x, y)).round() as i32
+                } else {
+                    even
                 };
                 let luma = (((i32::from(sum[0]) - black) * factor) >> 10) + black;
                 let luma_gap = (luma - i32::from(base[0])).abs();
@@ -150,23 +155,23 @@ impl Blocks {
 }
 
 /// Merges overlapping boxes until none overlap; returns them by row, then by column.
-fn joined(mut boxes: Vec<Rect>) -> Vec<Rect> {
-    let mut done: Vec<Rect> = Vec::new();
+fn merge_overlapping(mut boxes: Vec<Rect>) -> Vec<Rect> {
+    let mut merged: Vec<Rect> = Vec::new();
     while let Some(mut rect) = boxes.pop() {
-        while let Some(at) = done
+        while let Some(at) = merged
             .iter()
             .position(|other| !other.intersection(&rect).is_empty())
         {
-            rect = rect.union(&done.swap_remove(at));
+            rect = rect.union(&merged.swap_remove(at));
         }
-        done.push(rect);
+        merged.push(rect);
     }
-    done.sort_by_key(|found| (found.y, found.x));
-    done
+    merged.sort_by_key(|found| (found.y, found.x));
+    merged
 }
 
 /// Returns the pixel box of a box of blocks; it may reach beyond the right and bottom edge of the frame.
-fn pixels_of(blocks: Rect) -> Rect {
+fn box_in_pixels(blocks: Rect) -> Rect {
     let side = SIDE as u32;
     Rect {
         x: blocks.x * side,
@@ -219,17 +224,17 @@ mod tests {
     use crate::raster::ColorSpec;
 
     #[test]
-    fn a_bright_spot_is_proposed_and_nothing_else() {
-        let mut plate = Frame::new(61, 45, ColorSpec::default());
-        plate.planes.fill(100);
-        let blocks = Blocks::of(&plate);
-        let mut frame = plate.clone();
+    fn only_a_bright_spot_is_proposed() {
+        let mut background = Frame::new(61, 45, ColorSpec::default());
+        background.planes.fill(100);
+        let blocks = Blocks::new(&background);
+        let mut frame = background.clone();
         for y in 20..24 {
             for x in 41..46 {
                 frame.planes[y * 61 + x] = 140;
             }
         }
-        let (found, share) = blocks.proposals(&frame, &Light::SAME, 0);
+        let (found, share) = blocks.proposals(&frame, &Light::NEUTRAL, 0);
         assert_eq!(
             found,
             [Rect {
@@ -240,13 +245,16 @@ mod tests {
             }]
         );
         assert!((share - 2.0 / (16.0 * 12.0)).abs() < 1e-9);
-        assert_eq!(blocks.proposals(&plate, &Light::SAME, 0), (vec![], 0.0));
+        assert_eq!(
+            blocks.proposals(&background, &Light::NEUTRAL, 0),
+            (vec![], 0.0)
+        );
     }
 
     #[test]
-    fn boxes_that_meet_are_joined() {
+    fn overlapping_boxes_are_merged() {
         let rect = |x, w| Rect { x, y: 0, w, h: 4 };
-        let found = joined(vec![rect(0, 4), rect(10, 4), rect(3, 8), rect(20, 2)]);
+        let found = merge_overlapping(vec![rect(0, 4), rect(10, 4), rect(3, 8), rect(20, 2)]);
         assert_eq!(found, [rect(0, 14), rect(20, 2)]);
     }
 }

@@ -5,7 +5,7 @@ use crate::raster::runs::{self, Component};
 use crate::raster::{GivenMask, Mask};
 
 /// Least alpha of a silhouette pixel, 0..=255: half covered by the animal.
-const INSIDE: u8 = 128;
+const MIN_ALPHA: u8 = 128;
 
 /// Returns the connected components of a mask of the given size. Pixels inside the `ignored` boxes are left
 /// out.
@@ -19,7 +19,7 @@ pub(super) fn components(
         bits: mask
             .alpha
             .iter()
-            .map(|&alpha| u8::from(alpha >= INSIDE))
+            .map(|&alpha| u8::from(alpha >= MIN_ALPHA))
             .collect(),
     };
     for rect in ignored {

@@ -12,8 +12,8 @@ pub mod tether;
 
 pub use blocks::Blocks;
 
+use super::scene::background::Background;
 use super::scene::light::Light;
-use super::scene::plate::Plate;
 use crate::geometry::Rect;
 use crate::raster::runs::{self, Component};
 use crate::raster::{Frame, Mask, RgbImage};
@@ -27,16 +27,21 @@ const GROWTH_PX: u32 = 16;
 /// Returns the connected components of foreground pixels of a frame, in reading order of their first pixel.
 ///
 /// Pixels inside the `ignored` boxes are left out. When the frame has a given mask, the components are those
-/// of the mask. Holes and ragged edges remain; [`shaped`] mends them.
-pub fn components(frame: &Frame, plate: &Plate, light: &Light, ignored: &[Rect]) -> Vec<Component> {
-    let (boxes, _) = plate.blocks.proposals(frame, light, MARGIN_PX);
-    components_of(frame, plate, light, boxes, ignored)
+/// of the mask. Holes and ragged edges remain; [`smoothed`] mends them.
+pub fn components(
+    frame: &Frame,
+    background: &Background,
+    light: &Light,
+    ignored: &[Rect],
+) -> Vec<Component> {
+    let (boxes, _) = background.blocks.proposals(frame, light, MARGIN_PX);
+    components_in_boxes(frame, background, light, boxes, ignored)
 }
 
 /// Returns the components of foreground pixels as [`components`] does, from boxes that are already proposed.
-pub fn components_of(
+pub fn components_in_boxes(
     frame: &Frame,
-    plate: &Plate,
+    background: &Background,
     light: &Light,
     boxes: Vec<Rect>,
     ignored: &[Rect],
@@ -46,7 +51,7 @@ pub fn components_of(
     }
     let mut found: Vec<Component> = Vec::new();
     for rect in boxes {
-        for component in components_in(frame, plate, light, rect, ignored) {
+        for component in components_in_box(frame, background, light, rect, ignored) {
             if !found.contains(&component) {
                 found.push(component);
             }
@@ -60,7 +65,7 @@ pub fn components_of(
 ///
 /// The mask covers the component's box and one pixel around it. It is empty when no pixel passes the
 /// majority.
-pub fn shaped(component: &Component, width: u32, height: u32) -> Mask {
+pub fn smoothed(component: &Component, width: u32, height: u32) -> Mask {
     let mut mask = component.mask(component.rect.inflated(1, width, height));
     mask.fill_holes();
     mask.majority()
@@ -99,9 +104,9 @@ impl Difference {
 }
 
 /// Compares a box of a frame with the background.
-pub fn difference(frame: &Frame, plate: &Plate, light: &Light, rect: Rect) -> Difference {
+pub fn difference(frame: &Frame, background: &Background, light: &Light, rect: Rect) -> Difference {
     let mut rgb = frame.rgb(rect);
-    let factors = light.to_plate();
+    let factors = light.inverse_gains();
     if factors != [4096; 3] {
         for pixel in rgb.pixels.chunks_exact_mut(3) {
             for (value, factor) in pixel.iter_mut().zip(factors) {
@@ -118,27 +123,29 @@ pub fn difference(frame: &Frame, plate: &Plate, light: &Light, rect: Rect) -> Di
             }
         }
     }
-    let width = plate.rgb.width as usize;
+    let width = background.rgb.width as usize;
     let mut levels = Vec::with_capacity(rect.area() as usize);
     for (row, y) in rgb
         .pixels
         .chunks_exact(rect.w as usize * 3)
         .zip(rect.y as usize..)
     {
-        let base = &plate.rgb.pixels[(y * width + rect.x as usize) * 3..][..row.len()];
+        let base = &background.rgb.pixels[(y * width + rect.x as usize) * 3..][..row.len()];
         levels.extend(row.chunks_exact(3).zip(base.chunks_exact(3)).map(|(i, b)| {
             i[0].abs_diff(b[0])
                 .max(i[1].abs_diff(b[1]))
                 .max(i[2].abs_diff(b[2]))
         }));
     }
-    if let Some(other) = &plate.other {
+    if let Some(other) = &background.other {
         for (k, level) in levels.iter_mut().enumerate() {
-            let (x, y) = (k % rect.w as usize, k / rect.w as usize);
-            let at = ((rect.y as usize + y) * width + rect.x as usize + x) * 3;
-            let (base, other) = (&plate.rgb.pixels[at..at + 3], &other.pixels[at..at + 3]);
+            let at = 3 * background.px_in(rect, k);
+            let (base, other) = (
+                &background.rgb.pixels[at..at + 3],
+                &other.pixels[at..at + 3],
+            );
             if *level > 0 && base != other {
-                *level = beside(&rgb.pixels[3 * k..3 * k + 3], base, other);
+                *level = distance_from_segment(&rgb.pixels[3 * k..3 * k + 3], base, other);
             }
         }
     }
@@ -148,25 +155,25 @@ pub fn difference(frame: &Frame, plate: &Plate, light: &Light, rect: Rect) -> Di
 /// Returns the largest channel difference of a color from the nearest color on the line between two colors.
 ///
 /// A swaying thing covers a pixel in part, so its pixel takes any color between the two.
-fn beside(color: &[u8], base: &[u8], other: &[u8]) -> u8 {
+fn distance_from_segment(color: &[u8], base: &[u8], other: &[u8]) -> u8 {
     let gap = |a: &[u8], b: &[u8], c: usize| i32::from(a[c]) - i32::from(b[c]);
     let along: i32 = (0..3)
         .map(|c| gap(color, base, c) * gap(other, base, c))
         .sum();
     let length: i32 = (0..3).map(|c| gap(other, base, c).pow(2)).sum();
     let share = along.clamp(0, length);
-    let off = |c: usize| {
+    let deviation = |c: usize| {
         let nearest = i32::from(base[c]) + gap(other, base, c) * share / length.max(1);
         (i32::from(color[c]) - nearest).unsigned_abs() as u8
     };
-    off(0).max(off(1)).max(off(2))
+    deviation(0).max(deviation(1)).max(deviation(2))
 }
 
 /// Returns the components of one box. The box grows on each side that a component touches, by twice as many
 /// pixels each time.
-fn components_in(
+fn components_in_box(
     frame: &Frame,
-    plate: &Plate,
+    background: &Background,
     light: &Light,
     rect: Rect,
     ignored: &[Rect],
@@ -174,17 +181,19 @@ fn components_in(
     let mut rect = rect;
     let mut growth = i64::from(GROWTH_PX);
     loop {
-        let mut difference = difference(frame, plate, light, rect);
+        let mut difference = difference(frame, background, light, rect);
         ignored
             .iter()
             .for_each(|ignored| difference.clear(*ignored));
-        let found = hysteresis(&difference, plate);
-        let grow = |runs_out: bool| if runs_out { growth } else { 0 };
+        let found = hysteresis(&difference, background);
+        let growth_if = |runs_out: bool| if runs_out { growth } else { 0 };
         let grown = Rect::clipped(
-            i64::from(rect.x) - grow(found.iter().any(|c| c.rect.x == rect.x)),
-            i64::from(rect.y) - grow(found.iter().any(|c| c.rect.y == rect.y)),
-            i64::from(rect.right()) + grow(found.iter().any(|c| c.rect.right() == rect.right())),
-            i64::from(rect.bottom()) + grow(found.iter().any(|c| c.rect.bottom() == rect.bottom())),
+            i64::from(rect.x) - growth_if(found.iter().any(|c| c.rect.x == rect.x)),
+            i64::from(rect.y) - growth_if(found.iter().any(|c| c.rect.y == rect.y)),
+            i64::from(rect.right())
+                + growth_if(found.iter().any(|c| c.rect.right() == rect.right())),
+            i64::from(rect.bottom())
+                + growth_if(found.iter().any(|c| c.rect.bottom() == rect.bottom())),
             frame.width,
             frame.height,
         );
@@ -197,18 +206,17 @@ fn components_in(
 }
 
 /// Returns the components of pixels above the weak threshold that contain a pixel above the core threshold.
-fn hysteresis(difference: &Difference, plate: &Plate) -> Vec<Component> {
+fn hysteresis(difference: &Difference, background: &Background) -> Vec<Component> {
     let rect = difference.rect;
-    let width = plate.frame.width as usize;
     let mut weak = Mask::new(rect);
     let mut core = Mask::new(rect);
     let row_length = rect.w as usize;
     for (k, &level) in difference.levels.iter().enumerate() {
-        let px = (rect.y as usize + k / row_length) * width + rect.x as usize + k % row_length;
-        weak.bits[k] = u8::from(level > plate.weak_threshold(px));
-        core.bits[k] = u8::from(level > plate.core_threshold[px]);
+        let px = background.px_in(rect, k);
+        weak.bits[k] = u8::from(level > background.weak_threshold(px));
+        core.bits[k] = u8::from(level > background.core_threshold[px]);
     }
-    shadow::remove(&mut weak, &core, difference, plate);
+    shadow::remove(&mut weak, &core, difference, background);
     let has_core = |component: &Component| {
         component.runs.iter().any(|run| {
             let row = (run.y - rect.y) as usize * row_length;

@@ -1,112 +1,79 @@
 //! Removes cast shadows from silhouettes.
 //!
 //! A shadow pixel is darker than the background, but has its color and its texture (Horprasert et al. 1999).
-//! Only weak pixels are removed. None are removed when the animal is much darker than the background: a black
-//! mouse cannot be told from its own shadow. See docs/explanation/algorithms.md, "Silhouette".
+//! Only weak pixels are removed. See docs/explanation/algorithms.md, "Silhouette".
 
 use std::ops::RangeInclusive;
 
 use super::Difference;
-use crate::analysis::scene::plate::Plate;
+use crate::analysis::scene::background::Background;
 use crate::raster::Mask;
 use crate::raster::runs::Component;
 
 /// Brightness of a shadow as a share of the background's. Free choice.
-const RATIO: RangeInclusive<f32> = 0.45..=0.95;
+const BRIGHTNESS: RangeInclusive<f32> = 0.45..=0.95;
 /// Half side of the square whose texture is compared, pixels. Free choice.
 const RADIUS: i64 = 2;
 /// Least correlation of a shadow's texture with the background's. Free choice.
-const CORRELATION: f32 = 0.9;
-/// An animal is dark below this share of the background's brightness. Free choice.
-const DARK: f32 = 0.45;
+const MIN_CORRELATION: f32 = 0.9;
 
 /// Clears the weak pixels that are shadow. Core pixels stay set.
-pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, plate: &Plate) {
-    if is_dark(core, difference, plate) {
-        return;
-    }
-    let rect = difference.rect;
+pub fn remove(weak: &mut Mask, core: &Mask, difference: &Difference, background: &Background) {
     for k in 0..weak.bits.len() {
-        if weak.bits[k] == 1 && core.bits[k] == 0 {
-            let (x, y) = (k % rect.w as usize, k / rect.w as usize);
-            if is_shadow(difference, plate, x, y) {
-                weak.bits[k] = 0;
-            }
+        if weak.bits[k] == 1 && core.bits[k] == 0 && is_shadow(difference, background, k) {
+            weak.bits[k] = 0;
         }
     }
 }
 
 /// Returns whether at least 70 % of a component's pixels have the color of a shadow. `difference` covers its
 /// box.
-pub fn is_shadow_alone(difference: &Difference, plate: &Plate, component: &Component) -> bool {
+pub fn is_all_shadow(
+    difference: &Difference,
+    background: &Background,
+    component: &Component,
+) -> bool {
     let mask = component.mask(component.rect);
-    let width = mask.width();
-    let like = (0..mask.bits.len()).filter(|&k| {
-        mask.bits[k] == 1 && has_shadow_color(difference, plate, k % width, k / width)
-    });
+    let like = (0..mask.bits.len())
+        .filter(|&k| mask.bits[k] == 1 && has_shadow_color(difference, background, k));
     10 * like.count() as u64 >= 7 * component.area
 }
 
-/// Returns whether the median brightness of the core pixels is below [`DARK`] times the background's.
-fn is_dark(core: &Mask, difference: &Difference, plate: &Plate) -> bool {
-    let rect = difference.rect;
-    let mut ratios: Vec<f32> = (0..core.bits.len())
-        .filter(|&k| core.bits[k] == 1)
-        .map(|k| {
-            let (x, y) = (k % rect.w as usize, k / rect.w as usize);
-            let sum = |rgb: [u8; 3]| rgb.iter().map(|&c| f32::from(c)).sum::<f32>();
-            sum(difference.rgb.pixel(x as u32, y as u32))
-                / sum(plate.rgb.pixel(rect.x + x as u32, rect.y + y as u32)).max(1.0)
-        })
-        .collect();
-    if ratios.is_empty() {
-        return false;
-    }
-    let middle = ratios.len() / 2;
-    *ratios.select_nth_unstable_by(middle, f32::total_cmp).1 < DARK
-}
-
-fn is_shadow(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
-    has_shadow_color(difference, plate, x, y) && correlation(difference, plate, x, y) > CORRELATION
+fn is_shadow(difference: &Difference, background: &Background, k: usize) -> bool {
+    has_shadow_color(difference, background, k)
+        && correlation(difference, background, k) > MIN_CORRELATION
 }
 
 /// Returns whether a pixel has the background's color at a brightness that a shadow may have.
-fn has_shadow_color(difference: &Difference, plate: &Plate, x: usize, y: usize) -> bool {
-    has_darker_color(difference, plate, x, y, RATIO)
+fn has_shadow_color(difference: &Difference, background: &Background, k: usize) -> bool {
+    has_darker_color(difference, background, k, BRIGHTNESS)
 }
 
 /// Returns whether a pixel has the background's color, at a share of its brightness within `ratios`.
 pub fn has_darker_color(
     difference: &Difference,
-    plate: &Plate,
-    x: usize,
-    y: usize,
+    background: &Background,
+    k: usize,
     ratios: RangeInclusive<f32>,
 ) -> bool {
-    let rect = difference.rect;
-    let (px, py) = (rect.x + x as u32, rect.y + y as u32);
-    let color = |rgb: [u8; 3]| rgb.map(f32::from);
-    let i = color(difference.rgb.pixel(x as u32, y as u32));
-    let b = color(plate.rgb.pixel(px, py));
+    let px = background.px_in(difference.rect, k);
+    let i = [0, 1, 2].map(|c| f32::from(difference.rgb.pixels[3 * k + c]));
+    let b = background.color(px);
     let dot = |p: [f32; 3], q: [f32; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
     let ratio = dot(i, b) / dot(b, b).max(1.0);
     if !ratios.contains(&ratio) {
         return false;
     }
-    let gap = [
-        i[0] - ratio * b[0],
-        i[1] - ratio * b[1],
-        i[2] - ratio * b[2],
-    ];
-    let sigma = plate.sigma[py as usize * plate.frame.width as usize + px as usize];
-    dot(gap, gap) < (3.0 * sigma).powi(2)
+    let gap = [0, 1, 2].map(|c| i[c] - ratio * b[c]);
+    dot(gap, gap) < (3.0 * background.sigma[px]).powi(2)
 }
 
 /// Returns the normalized correlation of the green channel with the background's around a pixel, -1..=1.
 ///
 /// Returns 1 where both are flat: a shadow on an even wall has no texture to compare.
-fn correlation(difference: &Difference, plate: &Plate, x: usize, y: usize) -> f32 {
+fn correlation(difference: &Difference, background: &Background, k: usize) -> f32 {
     let rect = difference.rect;
+    let (x, y) = (k % rect.w as usize, k / rect.w as usize);
     let (mut n, mut i1, mut b1, mut ii, mut bb, mut ib) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for dy in -RADIUS..=RADIUS {
         for dx in -RADIUS..=RADIUS {
@@ -116,7 +83,7 @@ fn correlation(difference: &Difference, plate: &Plate, x: usize, y: usize) -> f3
             }
             let (sx, sy) = (sx as u32, sy as u32);
             let i = f32::from(difference.rgb.pixel(sx, sy)[1]);
-            let b = f32::from(plate.rgb.pixel(rect.x + sx, rect.y + sy)[1]);
+            let b = f32::from(background.rgb.pixel(rect.x + sx, rect.y + sy)[1]);
             n += 1.0;
             i1 += i;
             b1 += b;

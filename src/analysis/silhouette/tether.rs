@@ -8,10 +8,10 @@ use crate::raster::Mask;
 use crate::raster::runs::{self, Component};
 
 /// Greatest half width of a thin part, as a share of the component's greatest half width. Free choice.
-const THIN: f64 = 0.45;
+const THIN_SHARE: f64 = 0.45;
 /// A thin part with a diagonal above this multiple of the thin half width is too long for a tail. Free
 /// choice.
-const LONG: f64 = 6.0;
+const MIN_LENGTH: f64 = 6.0;
 /// Width of the blurred rim around the parts that are not thin, pixels. Free choice.
 const RIM_PX: u32 = 2;
 
@@ -21,7 +21,7 @@ pub fn thin_px(component: &Component) -> u32 {
     let mut mask = component.mask(component.rect);
     mask.fill_holes();
     let half_width = mask.depth_px().into_iter().max().unwrap_or(0);
-    (THIN * f64::from(half_width)) as u32
+    (THIN_SHARE * f64::from(half_width)) as u32
 }
 
 /// Splits a component into the animal and its tether.
@@ -47,26 +47,26 @@ pub fn cut(component: &Component, thin_px: u32, picture: [u32; 2]) -> Option<[Co
             .collect(),
     );
     let thick = thick.dilated_by(thin_px + RIM_PX);
-    let rest = part(
+    let thin = part(
         mask.bits
             .iter()
             .zip(&thick.bits)
             .map(|(set, thick)| set & (1 - thick))
             .collect(),
     );
-    let tether = runs::components(&rest)
+    let tether = runs::components(&thin)
         .into_iter()
         .filter(|part| touches_border(part.rect, picture) || is_long(part, thin_px))
         .max_by_key(|component| component.area)?;
-    let led_away = tether.mask(mask.rect);
-    let left = part(
+    let tether_mask = tether.mask(mask.rect);
+    let remainder = part(
         mask.bits
             .iter()
-            .zip(&led_away.bits)
+            .zip(&tether_mask.bits)
             .map(|(set, led)| set & (1 - led))
             .collect(),
     );
-    let animal = runs::components(&left)
+    let animal = runs::components(&remainder)
         .into_iter()
         .max_by_key(|component| component.area)?;
     Some([animal, tether])
@@ -79,14 +79,14 @@ pub fn end_px([animal, tether]: &[Component; 2]) -> [f64; 2] {
         .runs
         .iter()
         .flat_map(|run| [run.x0, run.x1].map(|x| [f64::from(x), f64::from(run.y)]));
-    let far = |p: &[f64; 2]| libm::hypot(p[0] - from[0], p[1] - from[1]);
-    ends.max_by(|a, b| far(a).total_cmp(&far(b)))
+    let distance_px = |p: &[f64; 2]| libm::hypot(p[0] - from[0], p[1] - from[1]);
+    ends.max_by(|a, b| distance_px(a).total_cmp(&distance_px(b)))
         .unwrap_or(from)
 }
 
 fn is_long(part: &Component, thin_px: u32) -> bool {
     let diagonal_px = libm::hypot(f64::from(part.rect.w), f64::from(part.rect.h));
-    diagonal_px > LONG * f64::from(thin_px)
+    diagonal_px > MIN_LENGTH * f64::from(thin_px)
 }
 
 /// Returns the animal and its tether as two components, or the whole component when there is no tether.
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cable_to_the_border_is_cut_off_and_a_tail_is_not() {
+    fn cable_to_the_border_is_cut_off_and_tail_is_not() {
         let cable = |x: f64, y: f64| y < 60.0 && (x - 40.0 - y / 3.0).abs() < 1.7;
         let both = component(|x, y| animal(x, y) || cable(x, y));
         let [cut_off, tether] = cut(&both, thin_px(&both), [120, 90]).expect("there is a cable");
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn an_animal_at_the_border_is_left_whole() {
+    fn animal_at_the_border_is_not_cut() {
         let low = component(|x, y| animal(x, y - 25.0));
         assert_eq!(cut(&low, thin_px(&low), [120, 90]), None);
     }

@@ -4,7 +4,7 @@
 //! animal's mean. Subtracting the bin at the same distance from the other end leaves numbers that only change
 //! sign when the head changes ends. So all frames together can separate heads from tails (`pose::ends`).
 
-use super::super::moments::Moments;
+use crate::analysis::moments::Moments;
 use crate::geometry::Rect;
 use crate::raster::RgbaImage;
 
@@ -30,7 +30,7 @@ pub struct Asymmetry {
 
 impl Asymmetry {
     /// Returns the asymmetry of a matte at `rect`; `None` when the moments have no axis.
-    pub fn of(rect: Rect, matte: &RgbaImage, moments: &Moments) -> Option<Asymmetry> {
+    pub fn measure(rect: Rect, matte: &RgbaImage, moments: &Moments) -> Option<Asymmetry> {
         let axis = moments.major_rad?;
         let (c, s) = (libm::cos(axis), libm::sin(axis));
         let [xx, xy, yy] = moments.covariance_px2;
@@ -56,12 +56,12 @@ impl Asymmetry {
         let mut ends = [0.0; N_NUMBERS];
         let [mut square, mut across, mut both] = [0.0; 3];
         for (weight, u, v, color) in pixels() {
-            let off = [0, 1, 2].map(|channel| color[channel] - mean[channel]);
-            let luma = 0.3 * off[0] + 0.59 * off[1] + 0.11 * off[2];
+            let deviation = [0, 1, 2].map(|channel| color[channel] - mean[channel]);
+            let luma = 0.3 * deviation[0] + 0.59 * deviation[1] + 0.11 * deviation[2];
             square += weight * luma * luma;
             across += weight * v * v;
             both += weight * luma * v;
-            let numbers = [1.0, off[0], off[1], off[2]];
+            let numbers = [1.0, deviation[0], deviation[1], deviation[2]];
             add(&mut ends, weight * u.signum(), u.abs() / along_px, numbers);
         }
         let share = N_BINS as f64 / moments.area_px;

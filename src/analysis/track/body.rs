@@ -11,7 +11,7 @@ use crate::raster::runs;
 const THIN: f64 = 0.3;
 
 /// Returns the largest part of a silhouette without its thin parts; empty for an empty silhouette.
-pub(super) fn of(silhouette: &Mask) -> Mask {
+pub(super) fn without_thin_parts(silhouette: &Mask) -> Mask {
     let depth = silhouette.depth_px();
     let half_width = depth.iter().copied().max().unwrap_or(0);
     let thin = (THIN * f64::from(half_width)) as u32;
@@ -44,7 +44,7 @@ mod tests {
     use crate::geometry::Rect;
 
     #[test]
-    fn a_tail_is_no_body() {
+    fn tail_is_removed() {
         let rect = Rect::of_size(80, 40);
         let body = |x: f64, y: f64| ((x - 25.0) / 18.0).powi(2) + ((y - 20.0) / 9.0).powi(2) < 1.0;
         let tail = |x: f64, y: f64| (40.0..76.0).contains(&x) && (y - 22.0).abs() < 1.6;
@@ -60,7 +60,7 @@ mod tests {
             rect,
             bits: bits(&body),
         };
-        let found = of(&whole);
+        let found = without_thin_parts(&whole);
         assert!(found.area() as f64 > 0.95 * alone.area() as f64);
         assert!(found.area() as f64 <= 1.02 * alone.area() as f64);
     }

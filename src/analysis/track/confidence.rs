@@ -13,6 +13,6 @@ pub(super) const FOUND: f64 = 0.5;
 const BASE: f64 = 5.0;
 
 /// Returns the probability that a candidate of this misfit is right, 0..=1: one half at a misfit of `FITS`.
-pub(super) fn of(misfit: f64) -> f64 {
+pub(super) fn from_misfit(misfit: f64) -> f64 {
     1.0 / (1.0 + libm::exp(BASE * (misfit / FITS - 1.0)))
 }

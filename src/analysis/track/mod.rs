@@ -3,7 +3,7 @@
 //! Every whole frame is compared with the background of its scene, block by block. This costs less than the
 //! paper's spiral of probes around a predicted place. Each component that may be the animal becomes a
 //! candidate and is cut out. When all frames are read, `path` chooses one candidate per frame. So the first
-//! thing in view is not mistaken for the animal. `movers` reports everything else that moved. See
+//! thing in view is not mistaken for the animal. `movers` lists everything else that moved. See
 //! docs/explanation/algorithms.md, "Tracking".
 
 use std::sync::Arc;
@@ -14,13 +14,12 @@ pub mod asymmetry;
 mod body;
 mod confidence;
 mod movers;
-mod parting;
 mod path;
 pub mod sighting;
 
-use self::movers::Other;
+use self::movers::MoverSighting;
 use self::path::Candidate;
-use self::sighting::{Choice, Sighting, View};
+use self::sighting::{CandidateShape, FrameView, Sighting};
 use super::params::Follow;
 use super::read_ahead::Batches;
 use super::scene::{Placed, Scene};
@@ -35,16 +34,11 @@ use crate::raster::{Frame, RgbaImage};
 use crate::scratch::{Full, Scratch};
 
 /// Greatest number of candidates per frame. Free choice.
-const MOST_CANDIDATES: usize = 3;
-/// A component above this multiple of the animal's median area is also tried in parts: it may be the animal
-/// and something that touches it. Free choice.
-const MERGED: f64 = 1.2;
-/// Extra cost of a candidate that is a part of a component. Free choice.
-const PART_COST: f64 = 2.0;
+const MAX_CANDIDATES: usize = 3;
 /// One frame in this many keeps the animal's surroundings. Free choice: it bounds the memory.
-const AROUND_EVERY: usize = 8;
+const SURROUNDINGS_EVERY: usize = 8;
 /// Least area of a reported mover, as a share of the animal's median area. Free choice.
-const LEAST_OTHER: f64 = 0.2;
+const MIN_MOVER_AREA: f64 = 0.2;
 
 /// One frame of the track.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,16 +46,16 @@ pub struct Tracked {
     /// Presentation time of the frame, seconds from the first frame.
     pub time_s: f64,
     /// Index of the background that the frame was compared with; `None` when the frame shows another scene.
-    pub plate_idx: Option<usize>,
+    pub background_idx: Option<usize>,
     /// The animal; `None` when it was not found.
     pub sighting: Option<Sighting>,
 }
 
 impl Tracked {
     /// Returns the animal if it was found in front of the main background.
-    pub fn before_main_plate(&self) -> Option<&Sighting> {
+    pub fn before_main_background(&self) -> Option<&Sighting> {
         let sighting = self.sighting.as_ref();
-        sighting.filter(|_| self.plate_idx == Some(0))
+        sighting.filter(|_| self.background_idx == Some(0))
     }
 }
 
@@ -85,12 +79,12 @@ impl Track {
     }
 }
 
-/// Candidates and other components of one frame.
-struct Seen {
+/// Candidates and possible movers of one frame.
+struct FrameResult {
     time_s: f64,
-    plate_idx: Option<usize>,
+    background_idx: Option<usize>,
     candidates: Vec<Candidate>,
-    others: Vec<Other>,
+    movers: Vec<MoverSighting>,
 }
 
 /// Follows the animal through the footage; returns one entry per frame.
@@ -105,31 +99,32 @@ pub fn follow(
     scratch: &Arc<dyn Scratch>,
     progress: &dyn Progress,
 ) -> Result<Track, Error> {
-    let mut seen: Vec<Seen> = Vec::with_capacity(n_frames_hint);
+    let mut results: Vec<FrameResult> = Vec::with_capacity(n_frames_hint);
     while let Some(batch) = batches.next_batch()? {
-        let first = seen.len();
-        let of = |(k, (time_s, frame)): (usize, &(f64, Frame))| {
-            look(first + k, *time_s, frame, scene, params, &**scratch)
+        let first = results.len();
+        let compared = |(k, (time_s, frame)): (usize, &(f64, Frame))| {
+            compare(first + k, *time_s, frame, scene, params, &**scratch)
         };
-        let of_batch: Result<Vec<Seen>, Full> = batch.par_iter().enumerate().map(of).collect();
-        seen.extend(of_batch?);
+        let of_batch: Result<Vec<FrameResult>, Full> =
+            batch.par_iter().enumerate().map(compared).collect();
+        results.extend(of_batch?);
         batches.give_back(batch);
-        let share = seen.len() as f64 / n_frames_hint.max(1) as f64;
+        let share = results.len() as f64 / n_frames_hint.max(1) as f64;
         progress.report("tracking", share);
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }
     }
-    if seen.len() < LEAST_FRAMES {
+    if results.len() < LEAST_FRAMES {
         return Err(Error::TooFewFrames {
-            n_frames: seen.len(),
+            n_frames: results.len(),
             least: LEAST_FRAMES,
         });
     }
-    let candidates: Vec<&[Candidate]> = seen.iter().map(|s| s.candidates.as_slice()).collect();
+    let candidates: Vec<&[Candidate]> = results.iter().map(|r| r.candidates.as_slice()).collect();
     let pin = params.animal_at.and_then(|at| {
         let candidates = candidates.get(at.frame as usize)?;
-        Some((at.frame as usize, nearest_to(candidates, at.at_px)?))
+        Some((at.frame as usize, nearest_candidate(candidates, at.at_px)?))
     });
     // A pinned animal is followed even when a larger one is in view.
     let follow = if pin.is_some() {
@@ -138,23 +133,26 @@ pub fn follow(
         params.follow
     };
     let chosen = path::choose(&candidates, &scene.subject, follow, pin);
-    let others = seen.iter().zip(&chosen).map(|(seen, &chosen)| {
-        let box_px = chosen.map(|(at, _)| seen.candidates[at].look.box_px);
-        movers::beside(&seen.others, box_px)
+    let movers = results.iter().zip(&chosen).map(|(result, &chosen)| {
+        let box_px = chosen.map(|(at, _)| result.candidates[at].look.box_px);
+        movers::outside_animal(&result.movers, box_px)
     });
-    let times_s: Vec<f64> = seen.iter().map(|s| s.time_s).collect();
-    let movers = movers::gathered(&others.collect::<Vec<_>>(), &times_s);
-    let tracked = seen.into_iter().zip(chosen).map(|(seen, chosen)| Tracked {
-        time_s: seen.time_s,
-        plate_idx: seen.plate_idx,
-        sighting: chosen.and_then(|(at, confidence)| {
-            let candidate = seen.candidates.into_iter().nth(at)?;
-            Some(Sighting {
-                confidence,
-                ..candidate.sighting
-            })
-        }),
-    });
+    let times_s: Vec<f64> = results.iter().map(|r| r.time_s).collect();
+    let movers = movers::gather(&movers.collect::<Vec<_>>(), &times_s);
+    let tracked = results
+        .into_iter()
+        .zip(chosen)
+        .map(|(result, chosen)| Tracked {
+            time_s: result.time_s,
+            background_idx: result.background_idx,
+            sighting: chosen.and_then(|(at, confidence)| {
+                let candidate = result.candidates.into_iter().nth(at)?;
+                Some(Sighting {
+                    confidence,
+                    ..candidate.sighting
+                })
+            }),
+        });
     let frames: Vec<Tracked> = tracked.collect();
     if frames.iter().all(|t| t.sighting.is_none()) {
         return Err(Error::NothingMoves);
@@ -168,45 +166,52 @@ pub fn follow(
 }
 
 /// Compares one frame with its background and measures the candidates.
-fn look(
+fn compare(
     frame_idx: usize,
     time_s: f64,
     frame: &Frame,
     scene: &Scene,
     params: &Params,
     scratch: &dyn Scratch,
-) -> Result<Seen, Full> {
+) -> Result<FrameResult, Full> {
     let Some(placed) = scene.place(frame_idx, frame) else {
-        return Ok(Seen {
+        return Ok(FrameResult {
             time_s,
-            plate_idx: None,
+            background_idx: None,
             candidates: Vec::new(),
-            others: Vec::new(),
+            movers: Vec::new(),
         });
     };
     let ignored = params.ignored_at(time_s, [frame.width, frame.height]);
-    let (described, others) = described(frame, &placed, scene, &ignored);
-    let view = View {
+    let components = components(frame, &placed, scene, &ignored);
+    let (described, movers) = described(components, frame, &placed, scene);
+    let view = FrameView {
         frame,
-        plate: placed.plate,
+        background: placed.background,
         light: &placed.light,
         ignored: &ignored,
-        keeps_around: !scene.is_masked && frame_idx.is_multiple_of(AROUND_EVERY),
+        keeps_surroundings: !scene.is_masked && frame_idx.is_multiple_of(SURROUNDINGS_EVERY),
     };
     let mut candidates = Vec::with_capacity(described.len());
-    for (component, look, cost) in described {
-        let silhouette = match scene.is_masked {
-            true => component.mask(component.rect),
-            false => silhouette::shaped(&component, frame.width, frame.height),
+    for Described {
+        component,
+        look,
+        cost,
+    } in described
+    {
+        let silhouette = if scene.is_masked {
+            component.mask(component.rect)
+        } else {
+            silhouette::smoothed(&component, frame.width, frame.height)
         };
         if silhouette.area() == 0 {
             continue;
         }
-        let choice = Choice {
+        let shape = CandidateShape {
             component,
             silhouette,
         };
-        if let Some(sighting) = view.look(&choice, scratch)? {
+        if let Some(sighting) = view.cut_out(&shape, scratch)? {
             candidates.push(Candidate {
                 look,
                 cost,
@@ -214,86 +219,98 @@ fn look(
             });
         }
     }
-    Ok(Seen {
+    Ok(FrameResult {
         time_s,
-        plate_idx: Some(placed.plate_idx),
+        background_idx: Some(placed.background_idx),
         candidates,
-        others,
+        movers,
     })
 }
 
-/// Returns the candidates of a frame and the components that may be movers.
-///
-/// Candidates are components, or parts of them, with their looks and costs; the cheapest come first.
-fn described(
+/// Returns the components of a frame, without tethers and split at a mirror's line.
+fn components(
     frame: &Frame,
     placed: &Placed<'_>,
     scene: &Scene,
     ignored: &[Rect],
-) -> (Vec<(Component, Look, f64)>, Vec<Other>) {
-    let subject = &scene.subject;
-    let is_image = |look: &Look| {
-        scene
-            .mirror
-            .is_some_and(|mirror| mirror.is_image(look.centroid_px))
-    };
+) -> Vec<Component> {
     let boxes = placed.boxes.clone();
     let mut components =
-        silhouette::components_of(frame, placed.plate, &placed.light, boxes, ignored);
+        silhouette::components_in_boxes(frame, placed.background, &placed.light, boxes, ignored);
     if let Some(thin_px) = scene.tether_px {
         let picture = [frame.width, frame.height];
         let cut = |component| tether::cut_all(component, thin_px, picture);
         components = components.into_iter().flat_map(cut).collect();
     }
     if let Some(mirror) = &scene.mirror {
-        let parted = |component| mirror.parted(component);
-        components = components.into_iter().flat_map(parted).collect();
+        let split = |component| mirror.split(component);
+        components = components.into_iter().flat_map(split).collect();
     }
-    let mut found: Vec<(Component, Look, f64)> = Vec::new();
-    let mut others = Vec::new();
+    components
+}
+
+/// A component with its look, and its misfit to the subject.
+struct Described {
+    component: Component,
+    look: Look,
+    cost: f64,
+}
+
+/// Returns the components that may be the animal, those of the least misfit first, and those that may be
+/// movers.
+fn described(
+    components: Vec<Component>,
+    frame: &Frame,
+    placed: &Placed<'_>,
+    scene: &Scene,
+) -> (Vec<Described>, Vec<MoverSighting>) {
+    let subject = &scene.subject;
+    let is_image = |look: &Look| {
+        let mirror = scene.mirror;
+        mirror.is_some_and(|mirror| mirror.is_image(look.centroid_px))
+    };
+    let mut described: Vec<Described> = Vec::new();
+    let mut movers = Vec::new();
     for component in components {
         if component.area < LEAST_AREA_PX {
             continue;
         }
-        let whole = describe(&component, frame, placed);
-        if component.area as f64 >= LEAST_OTHER * subject.area_px() {
-            others.push(Other::of(&whole, subject, is_image(&whole)));
+        let look = measure_look(&component, frame, placed);
+        if component.area as f64 >= MIN_MOVER_AREA * subject.area_px() {
+            movers.push(MoverSighting::new(&look, subject, is_image(&look)));
         }
-        if component.area as f64 > MERGED * subject.area_px() && !scene.is_masked {
-            let difference =
-                silhouette::difference(frame, placed.plate, &placed.light, component.rect);
-            for part in parting::parts_of(&component, &difference, subject.area_px()) {
-                let look = describe(&part, frame, placed);
-                let cost = subject.cost(&look) + PART_COST;
-                found.push((part, look, cost));
-            }
+        let cost = subject.cost(&look);
+        if cost < path::MAX_COST && !is_image(&look) {
+            described.push(Described {
+                component,
+                look,
+                cost,
+            });
         }
-        let cost = subject.cost(&whole);
-        found.push((component, whole, cost));
     }
-    found.retain(|(_, look, cost)| *cost < path::MOST_COST && !is_image(look));
-    found.sort_by(|a, b| a.2.total_cmp(&b.2));
-    found.truncate(MOST_CANDIDATES);
-    (found, others)
+    described.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    described.truncate(MAX_CANDIDATES);
+    (described, movers)
 }
 
 /// Returns the index of the candidate whose centroid is nearest to a point; `None` without candidates.
-fn nearest_to(candidates: &[Candidate], point_px: [f64; 2]) -> Option<usize> {
-    let off = |at: &usize| {
+fn nearest_candidate(candidates: &[Candidate], point_px: [f64; 2]) -> Option<usize> {
+    let distance_px = |at: &usize| {
         let [x, y] = candidates[*at].look.centroid_px;
         libm::hypot(x - point_px[0], y - point_px[1])
     };
-    (0..candidates.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
+    (0..candidates.len()).min_by(|a, b| distance_px(a).total_cmp(&distance_px(b)))
 }
 
-fn describe(component: &Component, frame: &Frame, placed: &Placed<'_>) -> Look {
-    let difference = silhouette::difference(frame, placed.plate, &placed.light, component.rect);
+fn measure_look(component: &Component, frame: &Frame, placed: &Placed<'_>) -> Look {
+    let difference =
+        silhouette::difference(frame, placed.background, &placed.light, component.rect);
     let picture = [frame.width, frame.height];
-    Look::of(
+    Look::measure(
         component,
         &difference.rgb,
         &difference.levels,
         picture,
-        placed.plate.light,
+        placed.background.light,
     )
 }

@@ -8,25 +8,25 @@ use crate::geometry::Rect;
 use crate::library::{Mover, MoverKind};
 
 /// Least duration of a mover, seconds. Free choice.
-const LEAST_S: f64 = 0.3;
+const MIN_DURATION_S: f64 = 0.3;
 /// Least number of frames of a mover. Free choice.
-const LEAST_SEEN: usize = 3;
+const MIN_SIGHTINGS: usize = 3;
 /// Longest gap between two sightings of one mover, seconds. Free choice.
-const GAP_S: f64 = 1.0;
+const MAX_GAP_S: f64 = 1.0;
 
 /// A component of one frame that may be a mover.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Other {
+pub(super) struct MoverSighting {
     box_px: Rect,
     on_border: bool,
     is_like_animal: bool,
     is_image: bool,
 }
 
-impl Other {
+impl MoverSighting {
     /// Returns the component that `look` describes; `is_image` marks a mirror image of the animal.
-    pub(super) fn of(look: &Look, subject: &Subject, is_image: bool) -> Other {
-        Other {
+    pub(super) fn new(look: &Look, subject: &Subject, is_image: bool) -> MoverSighting {
+        MoverSighting {
             box_px: look.box_px,
             on_border: look.on_border,
             is_like_animal: subject.cost(look) < FITS,
@@ -36,8 +36,8 @@ impl Other {
 }
 
 /// Returns the components of which less than half lies in the animal's box.
-pub(super) fn beside(others: &[Other], animal: Option<Rect>) -> Vec<Other> {
-    let apart = |other: &&Other| {
+pub(super) fn outside_animal(others: &[MoverSighting], animal: Option<Rect>) -> Vec<MoverSighting> {
+    let apart = |other: &&MoverSighting| {
         animal.is_none_or(|animal| {
             2 * animal.intersection(&other.box_px).area() < other.box_px.area()
         })
@@ -46,7 +46,7 @@ pub(super) fn beside(others: &[Other], animal: Option<Rect>) -> Vec<Other> {
 }
 
 /// A mover that may continue in the next frame.
-struct Open {
+struct OpenMover {
     last: Rect,
     first_s: f64,
     last_s: f64,
@@ -58,9 +58,9 @@ struct Open {
     n_images: usize,
 }
 
-impl Open {
-    fn of(other: &Other, time_s: f64) -> Open {
-        Open {
+impl OpenMover {
+    fn new(other: &MoverSighting, time_s: f64) -> OpenMover {
+        OpenMover {
             last: other.box_px,
             first_s: time_s,
             last_s: time_s,
@@ -73,7 +73,7 @@ impl Open {
         }
     }
 
-    fn add(&mut self, other: &Other, time_s: f64) {
+    fn add(&mut self, other: &MoverSighting, time_s: f64) {
         self.last = other.box_px;
         self.last_s = time_s;
         self.whole = self.whole.union(&other.box_px);
@@ -85,14 +85,14 @@ impl Open {
     }
 
     /// Returns whether a component of the next frame belongs to this mover.
-    fn is_near(&self, other: &Other) -> bool {
+    fn is_near(&self, other: &MoverSighting) -> bool {
         let margin = other.box_px.w.max(other.box_px.h);
         let reach = other.box_px.inflated(margin, u32::MAX / 2, u32::MAX / 2);
         !self.last.intersection(&reach).is_empty()
     }
 
     fn is_long(&self) -> bool {
-        self.n_seen >= LEAST_SEEN && self.last_s - self.first_s >= LEAST_S
+        self.n_seen >= MIN_SIGHTINGS && self.last_s - self.first_s >= MIN_DURATION_S
     }
 
     fn finished(self) -> Mover {
@@ -113,25 +113,26 @@ impl Open {
 }
 
 /// Returns the movers of a film by the time of their first sighting, from the other components of each frame.
-pub(super) fn gathered(frames: &[Vec<Other>], times_s: &[f64]) -> Vec<Mover> {
-    let (mut open, mut done): (Vec<Open>, Vec<Open>) = (Vec::new(), Vec::new());
+pub(super) fn gather(frames: &[Vec<MoverSighting>], times_s: &[f64]) -> Vec<Mover> {
+    let (mut open, mut done): (Vec<OpenMover>, Vec<OpenMover>) = (Vec::new(), Vec::new());
     for (others, &time_s) in frames.iter().zip(times_s) {
         for other in others {
             match open.iter_mut().find(|known| known.is_near(other)) {
                 Some(known) => known.add(other, time_s),
-                None => open.push(Open::of(other, time_s)),
+                None => open.push(OpenMover::new(other, time_s)),
             }
         }
-        let (over, going): (Vec<Open>, Vec<Open>) =
-            open.into_iter().partition(|o| time_s - o.last_s > GAP_S);
+        let (over, going): (Vec<OpenMover>, Vec<OpenMover>) = open
+            .into_iter()
+            .partition(|o| time_s - o.last_s > MAX_GAP_S);
         done.extend(over);
         open = going;
     }
     done.extend(open);
     let mut movers: Vec<Mover> = done
         .into_iter()
-        .filter(Open::is_long)
-        .map(Open::finished)
+        .filter(OpenMover::is_long)
+        .map(OpenMover::finished)
         .collect();
     movers.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
     movers
@@ -143,8 +144,8 @@ mod tests {
 
     const FPS: f64 = 30.0;
 
-    fn at(x: u32, y: u32, w: u32, h: u32) -> Other {
-        Other {
+    fn at(x: u32, y: u32, w: u32, h: u32) -> MoverSighting {
+        MoverSighting {
             box_px: Rect { x, y, w, h },
             on_border: false,
             is_like_animal: false,
@@ -153,23 +154,23 @@ mod tests {
     }
 
     /// Returns the movers of 90 frames with the components `seen(frame)`.
-    fn of(seen: impl Fn(u32) -> Vec<Other>) -> Vec<Mover> {
-        let frames: Vec<Vec<Other>> = (0..90).map(seen).collect();
+    fn movers_of(seen: impl Fn(u32) -> Vec<MoverSighting>) -> Vec<Mover> {
+        let frames: Vec<Vec<MoverSighting>> = (0..90).map(seen).collect();
         let times_s: Vec<f64> = (0..90).map(|k| f64::from(k) / FPS).collect();
-        gathered(&frames, &times_s)
+        gather(&frames, &times_s)
     }
 
     #[test]
-    fn a_hand_that_comes_in_and_goes_is_one_mover_with_its_time_and_place() {
+    fn hand_that_enters_and_leaves_is_one_mover() {
         let hand = |k: u32| {
             let reach = 10 + 2 * (k - 30).min(60 - k);
-            let hand = Other {
+            let hand = MoverSighting {
                 on_border: true,
                 ..at(100, 0, 20, reach)
             };
             vec![hand]
         };
-        let movers = of(|k| {
+        let movers = movers_of(|k| {
             if (30..60).contains(&k) {
                 hand(k)
             } else {
@@ -193,9 +194,9 @@ mod tests {
     }
 
     #[test]
-    fn what_is_seen_for_a_moment_is_none() {
+    fn brief_sightings_are_no_mover() {
         assert_eq!(
-            of(|k| if k < 8 {
+            movers_of(|k| if k < 8 {
                 vec![at(5, 5, 9, 9)]
             } else {
                 Vec::new()
@@ -209,29 +210,29 @@ mod tests {
                 Vec::new()
             }
         };
-        assert_eq!(of(twice), [], "two frames are too few");
+        assert_eq!(movers_of(twice), [], "two frames are too few");
     }
 
     #[test]
-    fn who_comes_again_later_is_told_of_twice_in_order_of_time() {
+    fn returning_mover_is_listed_twice_in_order_of_time() {
         let seen = |k: u32| match k {
             0..20 => vec![at(50, 50, 10, 10)],
             20..60 => vec![at(200, 80, 10, 10)],
             60.. => vec![at(50, 50, 10, 10)],
         };
-        let times: Vec<f64> = of(seen).iter().map(|mover| mover.from_s).collect();
+        let times: Vec<f64> = movers_of(seen).iter().map(|mover| mover.from_s).collect();
         assert_eq!(times, [0.0, 20.0 / FPS, 2.0]);
     }
 
     #[test]
-    fn the_kind_is_what_most_sightings_say() {
-        let kind = |seen: &dyn Fn(u32) -> Other| of(|k| vec![seen(k)])[0].kind;
+    fn kind_is_that_of_most_sightings() {
+        let kind = |seen: &dyn Fn(u32) -> MoverSighting| movers_of(|k| vec![seen(k)])[0].kind;
         let runs = |k: u32| at(10 + 3 * k, 40, 12, 8);
-        let image = |k| Other {
+        let image = |k| MoverSighting {
             is_image: k % 3 > 0,
             ..runs(k)
         };
-        let like = |k| Other {
+        let like = |k| MoverSighting {
             is_like_animal: k % 3 > 0,
             ..runs(k)
         };
@@ -242,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn what_overlaps_the_animal_is_the_animal() {
+    fn components_in_the_animals_box_are_no_movers() {
         let animal = Rect {
             x: 10,
             y: 10,
@@ -250,7 +251,7 @@ mod tests {
             h: 20,
         };
         let others = [at(15, 12, 10, 10), at(45, 12, 20, 10), at(200, 5, 10, 10)];
-        assert_eq!(beside(&others, Some(animal)), others[1..]);
-        assert_eq!(beside(&others, None), others);
+        assert_eq!(outside_animal(&others, Some(animal)), others[1..]);
+        assert_eq!(outside_animal(&others, None), others);
     }
 }

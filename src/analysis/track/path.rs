@@ -1,8 +1,8 @@
 //! Chooses the animal's path: at most one candidate per frame, for the whole film at once.
 //!
-//! Dynamic programming finds the cheapest path. A candidate costs its misfit to the subject. A step costs its
-//! excess over the usual distance, and its change of area. A frame without the animal has a fixed cost. So a
-//! hand, a speck or half a silhouette is chosen only where no candidate fits better.
+//! Dynamic programming finds the cheapest path. A candidate costs half its misfit to the subject. A leap to
+//! a thing that was seen elsewhere at the same time costs much. A frame without the animal has a fixed cost.
+//! So a hand, a speck or half a silhouette is chosen only where no candidate fits better.
 
 use super::confidence;
 use super::sighting::Sighting;
@@ -11,29 +11,23 @@ use crate::analysis::subject::{FITS, Look, Subject};
 use crate::order;
 
 /// Cost from which a look is never a candidate. Free choice.
-pub(super) const MOST_COST: f64 = 24.0;
+pub(super) const MAX_COST: f64 = 24.0;
 /// Cost of a frame without the animal. Free choice.
-const ABSENT: f64 = 10.0;
-/// Greatest cost of a step's distance. Free choice.
-const FARTHEST: f64 = 80.0;
+const ABSENCE_COST: f64 = 10.0;
 /// A step is a leap beyond this many spreads of the distance. Free choice.
-const LEAP: f64 = 2.0;
+const LEAP_SPREADS: f64 = 2.0;
 /// A leap leads to another thing when that one was closer by this factor. Free choice.
-const NEARER: f64 = 3.0;
-/// Extra cost of a leap to a thing that was visible together with the start of the leap. Free choice.
-const TAKEN: f64 = 400.0;
-/// Weight of a candidate's cost up to `FITS`. Free choice.
-const FITTING: f64 = 0.05;
-/// Greatest cost of a change of area. Free choice.
-const LARGEST_CHANGE: f64 = 3.0;
+const NEARER_FACTOR: f64 = 3.0;
+/// Cost of a leap to a thing that was visible together with the start of the leap. Free choice.
+const LEAP_COST: f64 = 400.0;
 /// Standard deviation of the change of log area between successive frames. Free choice.
-const CHANGE_SPREAD: f64 = 0.3;
+const AREA_CHANGE_SPREAD: f64 = 0.3;
 /// Reward of a candidate that the user pointed at; it exceeds the sum of all other costs.
-const PINNED: f64 = 1e9;
+const PIN_REWARD: f64 = 1e9;
 /// Greatest number of frames that a step spans; after a longer gap the animal may be anywhere. Free choice.
-const MOST_MISSED: usize = 30;
+const MAX_MISSED_FRAMES: usize = 30;
 
-/// A component, or a part of one, that may be the animal in a frame.
+/// A component that may be the animal in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Candidate {
     /// Its size, color and place.
@@ -56,7 +50,7 @@ pub(super) fn choose(
 ) -> Vec<Option<(usize, f64)>> {
     let mut paths = Paths {
         frames,
-        steps: Steps::of(frames, subject),
+        motion: Motion::new(frames, subject),
         best: Vec::with_capacity(frames.len()),
         forgotten: Path {
             cost: 0.0,
@@ -64,25 +58,25 @@ pub(super) fn choose(
         },
     };
     for (t, candidates) in frames.iter().enumerate() {
-        paths.forget(t);
+        paths.update_forgotten(t);
         let fitting = candidates.iter().filter(|c| c.cost < FITS);
         let largest_px = fitting.map(|c| c.look.area_px).fold(0.0, f64::max);
         let smaller = |candidate: &Candidate| match follow {
             Follow::One => 0.0,
             Follow::Largest => libm::log(largest_px / candidate.look.area_px).max(0.0),
         };
-        let path = |(at, candidate): (usize, &Candidate)| {
-            let mut path = paths.to(t, candidate);
-            path.cost += of_look(candidate.cost) + smaller(candidate);
+        let path_to = |(at, candidate): (usize, &Candidate)| {
+            let mut path = paths.cheapest_to(t, candidate);
+            path.cost += 0.5 * candidate.cost + smaller(candidate);
             if pin == Some((t, at)) {
-                path.cost -= PINNED;
+                path.cost -= PIN_REWARD;
             }
             path
         };
-        let best = candidates.iter().enumerate().map(path).collect();
+        let best = candidates.iter().enumerate().map(path_to).collect();
         paths.best.push(best);
     }
-    judged(&paths.cheapest(), frames, &paths.steps)
+    judge_stretches(&paths.cheapest(), frames, &paths.motion)
 }
 
 /// A candidate: its frame and its index in the frame.
@@ -99,7 +93,7 @@ struct Path {
 /// The cheapest paths to all candidates of the frames processed.
 struct Paths<'a> {
     frames: &'a [&'a [Candidate]],
-    steps: Steps,
+    motion: Motion,
     best: Vec<Vec<Path>>,
     /// The cheapest path that ended too long ago for a step, or the empty path.
     ///
@@ -109,13 +103,13 @@ struct Paths<'a> {
 
 impl Paths<'_> {
     /// Updates `forgotten` with the paths that end just too far before frame `t` for a step.
-    fn forget(&mut self, t: usize) {
-        let Some(old) = t.checked_sub(MOST_MISSED + 1) else {
+    fn update_forgotten(&mut self, t: usize) {
+        let Some(old) = t.checked_sub(MAX_MISSED_FRAMES + 1) else {
             return;
         };
         for (at, path) in self.best[old].iter().enumerate() {
             // Subtracts the cost of missing all frames up to the end, to compare ends at different frames.
-            let cost = path.cost - ABSENT * (old + 1) as f64;
+            let cost = path.cost - ABSENCE_COST * (old + 1) as f64;
             if cost < self.forgotten.cost {
                 let from = Some((old, at));
                 self.forgotten = Path { cost, from };
@@ -124,23 +118,21 @@ impl Paths<'_> {
     }
 
     /// Returns the cheapest path to a candidate of frame `t`, without the candidate's own cost.
-    fn to(&self, t: usize, candidate: &Candidate) -> Path {
-        let afar = self.forgotten.from.map_or(0.0, |_| FARTHEST);
+    fn cheapest_to(&self, t: usize, candidate: &Candidate) -> Path {
         let mut best = Path {
-            cost: self.forgotten.cost + ABSENT * t as f64 + afar,
+            cost: self.forgotten.cost + ABSENCE_COST * t as f64,
             ..self.forgotten
         };
-        for before in t.saturating_sub(MOST_MISSED)..t {
+        for before in t.saturating_sub(MAX_MISSED_FRAMES)..t {
             let n_missed = t - before - 1;
             for (at, previous) in self.frames[before].iter().enumerate() {
                 let beside = self.frames[before].iter().enumerate();
                 let others = beside.filter(|(k, _)| *k != at).map(|(_, o)| &o.look);
                 let cost = self.best[before][at].cost
-                    + ABSENT * n_missed as f64
+                    + ABSENCE_COST * n_missed as f64
                     + self
-                        .steps
-                        .cost(&previous.look, &candidate.look, n_missed + 1)
-                    + self.steps.taken(&previous.look, &candidate.look, others);
+                        .motion
+                        .leap_cost(&previous.look, &candidate.look, others);
                 if cost < best.cost {
                     let from = Some((before, at));
                     best = Path { cost, from };
@@ -155,13 +147,13 @@ impl Paths<'_> {
         let n = self.frames.len();
         let ends = self.best.iter().enumerate().flat_map(|(t, paths)| {
             let with_rest = move |(at, path): (usize, &Path)| {
-                (path.cost + ABSENT * (n - 1 - t) as f64, (t, at))
+                (path.cost + ABSENCE_COST * (n - 1 - t) as f64, (t, at))
             };
             paths.iter().enumerate().map(with_rest)
         });
         let mut node = ends
             .min_by(|a, b| a.0.total_cmp(&b.0))
-            .filter(|(cost, _)| *cost < ABSENT * n as f64)
+            .filter(|(cost, _)| *cost < ABSENCE_COST * n as f64)
             .map(|(_, node)| node);
         let mut chosen = vec![None; n];
         while let Some((t, at)) = node {
@@ -177,16 +169,16 @@ impl Paths<'_> {
 /// The path is divided at gaps, leaps and sudden changes of area, so that each stretch shows one thing. The
 /// probability follows from the stretch's median misfit: near the lens, in the dark or at the border, an
 /// animal differs from its usual look for a while. A stretch that is probably wrong is dropped.
-fn judged(
+fn judge_stretches(
     chosen: &[Option<usize>],
     frames: &[&[Candidate]],
-    steps: &Steps,
+    motion: &Motion,
 ) -> Vec<Option<(usize, f64)>> {
     let candidate = |t: usize| chosen[t].map(|at| &frames[t][at]);
     let is_end = |&t: &usize| {
         let before = t.checked_sub(1).and_then(candidate);
         let pair = before.zip(candidate(t));
-        pair.is_none_or(|(a, b)| steps.is_break(&a.look, &b.look))
+        pair.is_none_or(|(a, b)| motion.is_break(&a.look, &b.look))
     };
     let ends: Vec<usize> = (0..frames.len())
         .filter(is_end)
@@ -195,7 +187,7 @@ fn judged(
     let mut judged = vec![None; frames.len()];
     for stretch in ends.windows(2).map(|ends| ends[0]..ends[1]) {
         let misfits = stretch.clone().filter_map(|t| Some(candidate(t)?.cost));
-        let confidence = order::median(misfits).map_or(0.0, confidence::of);
+        let confidence = order::median(misfits).map_or(0.0, confidence::from_misfit);
         if confidence >= confidence::FOUND {
             for t in stretch {
                 judged[t] = chosen[t].map(|at| (at, confidence));
@@ -205,23 +197,16 @@ fn judged(
     judged
 }
 
-/// Returns the cost of a look in a path: nearly 0 up to `FITS`, then half of the excess.
-///
-/// Looks of successive frames are alike, so small differences carry less information than independent ones.
-fn of_look(cost: f64) -> f64 {
-    FITTING * cost.min(FITS) + 0.5 * (cost - FITS).max(0.0)
-}
-
-/// Parameters of the cost of a step between two looks.
-struct Steps {
+/// The animal's movement from frame to frame. A faster one is a leap.
+struct Motion {
     /// 90th percentile of the animal's movement from frame to frame, pixels.
     usual_px: f64,
     /// Standard deviation of movement beyond that, pixels.
     spread_px: f64,
 }
 
-impl Steps {
-    fn of(frames: &[&[Candidate]], subject: &Subject) -> Steps {
+impl Motion {
+    fn new(frames: &[&[Candidate]], subject: &Subject) -> Motion {
         // From the best candidate to the nearest of the next frame: of several animals, any may be the best.
         let fitting = |candidates: &&[Candidate]| -> Vec<[f64; 2]> {
             let mut fitting: Vec<&Candidate> =
@@ -236,45 +221,34 @@ impl Steps {
             steps.min_by(f64::total_cmp)
         };
         let mut steps: Vec<f64> = places.windows(2).filter_map(step).collect();
-        Steps {
+        Motion {
             usual_px: order::percentile(&mut steps, 0.9).unwrap_or(0.0),
             spread_px: (0.5 * subject.diagonal_px).max(4.0),
         }
     }
 
-    fn cost(&self, a: &Look, b: &Look, n_frames: usize) -> f64 {
-        let n = n_frames as f64;
-        let change = libm::log(b.area_px / a.area_px) / (CHANGE_SPREAD * n.sqrt());
-        self.far(a, b, n) + (0.5 * change * change).min(LARGEST_CHANGE)
-    }
-
-    /// Returns the part of the cost that comes from the distance.
-    fn far(&self, a: &Look, b: &Look, n: f64) -> f64 {
-        let beyond = (distance(a.centroid_px, b.centroid_px) - self.usual_px * n).max(0.0);
-        let far = beyond / (self.spread_px * n.sqrt());
-        (0.5 * far * far).min(FARTHEST)
-    }
-
     fn is_leap(&self, a: &Look, b: &Look) -> bool {
-        distance(a.centroid_px, b.centroid_px) > LEAP * self.spread_px + self.usual_px
+        distance(a.centroid_px, b.centroid_px) > LEAP_SPREADS * self.spread_px + self.usual_px
     }
 
     /// Returns whether two successive looks may belong to two things: they are a leap apart, or differ in
     /// area.
     fn is_break(&self, a: &Look, b: &Look) -> bool {
         let change = libm::log(b.area_px / a.area_px).abs();
-        self.is_leap(a, b) || change > LEAP * CHANGE_SPREAD
+        self.is_leap(a, b) || change > LEAP_SPREADS * AREA_CHANGE_SPREAD
     }
 
-    /// Returns the extra cost of a leap from `a` to `b` when one of the `others` was much closer to `b`.
+    /// Returns the cost of a leap from `a` to `b` when one of the `others` was much closer to `b`.
     ///
     /// The `others` were seen in the same frame as `a`, so the leap would join two different things.
-    fn taken<'a>(&self, a: &Look, b: &Look, mut others: impl Iterator<Item = &'a Look>) -> f64 {
+    fn leap_cost<'a>(&self, a: &Look, b: &Look, mut others: impl Iterator<Item = &'a Look>) -> f64 {
         let leap_px = distance(a.centroid_px, b.centroid_px);
-        let nearer = |other: &Look| NEARER * distance(other.centroid_px, b.centroid_px) < leap_px;
-        match self.is_leap(a, b) && others.any(nearer) {
-            true => TAKEN,
-            false => 0.0,
+        let nearer =
+            |other: &Look| NEARER_FACTOR * distance(other.centroid_px, b.centroid_px) < leap_px;
+        if self.is_leap(a, b) && others.any(nearer) {
+            LEAP_COST
+        } else {
+            0.0
         }
     }
 }
@@ -297,7 +271,7 @@ mod tests {
         image.pixels.fill(255);
         let look = Look {
             area_px: 200.0,
-            color: Color::of(std::iter::empty()),
+            color: Color::from_pixels(std::iter::empty()),
             contrast: 60.0,
             box_px: rect,
             centroid_px: [x, 50.0],
@@ -326,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_there_first_and_fits_less_is_not_the_animal() {
+    fn thing_that_came_first_and_fits_less_is_not_chosen() {
         let frames: Vec<Vec<Candidate>> = (0..60)
             .map(|t| {
                 let hand = candidate(400.0, 12.0);
@@ -344,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn an_animal_that_is_hidden_for_a_while_is_not_made_up() {
+    fn hidden_animal_is_not_replaced() {
         let frames: Vec<Vec<Candidate>> = (0..60)
             .map(|t| match t {
                 20..30 => vec![candidate(300.0, 23.0)],
@@ -356,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_that_are_alike_the_one_that_was_pointed_at_is_followed() {
+    fn pinned_one_of_two_alike_things_is_followed() {
         let frames: Vec<Vec<Candidate>> = (0..40)
             .map(|t| {
                 vec![
@@ -374,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thing_is_as_sure_as_it_is_like_the_subject_in_most_of_its_frames() {
+    fn confidence_follows_the_median_misfit_of_a_stretch() {
         // Two things, a leap apart; the second has a high misfit for ten frames.
         let frames: Vec<Vec<Candidate>> = (0..60)
             .map(|t| match t {

@@ -6,8 +6,8 @@ use super::asymmetry::Asymmetry;
 use super::body;
 use crate::analysis::matte;
 use crate::analysis::moments::{self, Moments};
+use crate::analysis::scene::background::Background;
 use crate::analysis::scene::light::Light;
-use crate::analysis::scene::plate::Plate;
 use crate::analysis::{silhouette, subject};
 use crate::geometry::Rect;
 use crate::raster::runs::Component;
@@ -43,26 +43,26 @@ pub struct Sighting {
     /// Whether the silhouette touches the border of the frame or an ignored box.
     pub cut: bool,
     /// The frame around the animal; `None` in most frames.
-    pub around: Option<Around>,
+    pub surroundings: Option<Surroundings>,
 }
 
 /// A stored part of a frame: RGB, in the light of the background.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Around {
+pub struct Surroundings {
     /// Box in the frame, pixels.
     pub rect: Rect,
     /// Offset of the pixels in the scratch storage.
     pub at: u64,
 }
 
-/// Margin of `around` on each side, as a share of the box's diagonal: the search range for a shadow. Free
-/// choice.
-const ROOM: f64 = 0.3;
+/// Margin of the surroundings on each side, as a share of the box's diagonal: the search range for a shadow.
+/// Free choice.
+const SURROUNDINGS_MARGIN: f64 = 0.3;
 
 impl Sighting {
     /// Measures a matte at `rect`; returns `None` when all its pixels are transparent.
     ///
-    /// `at`, `confidence`, `box_px`, `cut` and `around` get placeholders.
+    /// `at`, `confidence`, `box_px`, `cut` and `surroundings` get placeholders.
     pub(in crate::analysis) fn measured(rect: Rect, matte: &RgbaImage) -> Option<Sighting> {
         let pixels = matte.pixels.as_chunks::<4>().0;
         let weights: Vec<u8> = pixels.iter().map(|rgba| rgba[3]).collect();
@@ -71,12 +71,12 @@ impl Sighting {
         let solid = solid(rect, matte);
         let extent_px = |along_rad| moments::extent_px(&solid, along_rad);
         let quarter = std::f64::consts::FRAC_PI_2;
-        let body = body::of(&solid);
+        let body = body::without_thin_parts(&solid);
         let opaque: Vec<u8> = body.bits.iter().map(|bit| 255 * bit).collect();
         let body_rad = moments::moments(body.rect, &opaque).and_then(|body| body.major_rad);
         let along_body = body_rad.unwrap_or(axis);
         Some(Sighting {
-            asymmetry: Asymmetry::of(rect, matte, &moments),
+            asymmetry: Asymmetry::measure(rect, matte, &moments),
             body_rad,
             body_extent_px: [extent_px(along_body), extent_px(along_body + quarter)],
             rect,
@@ -88,13 +88,13 @@ impl Sighting {
             upright_px: extent_px(quarter),
             box_px: rect,
             cut: false,
-            around: None,
+            surroundings: None,
         })
     }
 }
 
 /// The component of a candidate and its silhouette.
-pub struct Choice {
+pub struct CandidateShape {
     /// The component as found.
     pub component: Component,
     /// The component without holes and specks.
@@ -102,47 +102,63 @@ pub struct Choice {
 }
 
 /// A frame with the background to compare it with.
-pub struct View<'a> {
+pub struct FrameView<'a> {
     /// The frame.
     pub frame: &'a Frame,
     /// The background.
-    pub plate: &'a Plate,
+    pub background: &'a Background,
     /// Light of the frame relative to the background.
     pub light: &'a Light,
     /// Boxes to ignore.
     pub ignored: &'a [Rect],
     /// Whether to store the animal's surroundings.
-    pub keeps_around: bool,
+    pub keeps_surroundings: bool,
 }
 
-impl View<'_> {
+impl FrameView<'_> {
     /// Cuts the animal out, stores and measures it; returns `None` when all its pixels are transparent.
-    pub fn look(&self, choice: &Choice, scratch: &dyn Scratch) -> Result<Option<Sighting>, Full> {
-        let rect = choice.component.rect;
+    pub fn cut_out(
+        &self,
+        shape: &CandidateShape,
+        scratch: &dyn Scratch,
+    ) -> Result<Option<Sighting>, Full> {
+        let rect = shape.component.rect;
         let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
-        let silhouette = &choice.silhouette;
-        let matte = matte::pull(self.frame, self.plate, self.light, silhouette, length_px);
+        let silhouette = &shape.silhouette;
+        let matte = matte::pull(
+            self.frame,
+            self.background,
+            self.light,
+            silhouette,
+            length_px,
+        );
         let Some(measured) = Sighting::measured(matte.rect, &matte.image) else {
             return Ok(None);
         };
         let cut = self.cuts(rect);
-        let room_px = (self.keeps_around && !cut).then_some((ROOM * length_px).ceil() as u32);
+        let margin_px = (self.keeps_surroundings && !cut)
+            .then_some((SURROUNDINGS_MARGIN * length_px).ceil() as u32);
         Ok(Some(Sighting {
             at: scratch.put(&matte.image.pixels)?,
             box_px: rect,
             cut,
-            around: room_px
-                .map(|px| self.around(rect, px, scratch))
+            surroundings: margin_px
+                .map(|px| self.surroundings(rect, px, scratch))
                 .transpose()?,
             ..measured
         }))
     }
 
-    fn around(&self, rect: Rect, room_px: u32, scratch: &dyn Scratch) -> Result<Around, Full> {
-        let rect = rect.inflated(room_px, self.frame.width, self.frame.height);
-        let seen = silhouette::difference(self.frame, self.plate, self.light, rect).rgb;
+    fn surroundings(
+        &self,
+        rect: Rect,
+        margin_px: u32,
+        scratch: &dyn Scratch,
+    ) -> Result<Surroundings, Full> {
+        let rect = rect.inflated(margin_px, self.frame.width, self.frame.height);
+        let seen = silhouette::difference(self.frame, self.background, self.light, rect).rgb;
         let at = scratch.put(&seen.pixels)?;
-        Ok(Around { rect, at })
+        Ok(Surroundings { rect, at })
     }
 
     /// Returns whether a box touches the border of the frame or an ignored box.
@@ -168,7 +184,7 @@ fn solid(rect: Rect, matte: &RgbaImage) -> Mask {
 /// Returns the greatest distance of pixels with alpha from the centroid: horizontal, vertical, in any
 /// direction.
 fn reach_px(rect: Rect, matte: &RgbaImage, [cx, cy]: [f64; 2]) -> [f64; 3] {
-    let mut most = [0.0f64; 3];
+    let mut reach = [0.0f64; 3];
     let columns = rect.w.max(1) as usize;
     let rows = matte.pixels.as_chunks::<4>().0.chunks_exact(columns);
     let inside = |rgba: &[u8; 4]| rgba[3] > 0;
@@ -182,12 +198,12 @@ fn reach_px(rect: Rect, matte: &RgbaImage, [cx, cy]: [f64; 2]) -> [f64; 3] {
         for column in ends {
             let dx = (f64::from(rect.x + column as u32) + 0.5 - cx).abs() + 0.5;
             let dy = (f64::from(y) + 0.5 - cy).abs() + 0.5;
-            most = [
-                most[0].max(dx),
-                most[1].max(dy),
-                most[2].max(libm::hypot(dx, dy)),
+            reach = [
+                reach[0].max(dx),
+                reach[1].max(dy),
+                reach[2].max(libm::hypot(dx, dy)),
             ];
         }
     }
-    most
+    reach
 }

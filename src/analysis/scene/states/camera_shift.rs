@@ -16,15 +16,15 @@ use crate::raster::Frame;
 /// Side of a tile, pixels; a power of two. Free choice.
 const SIDE: usize = 64;
 /// Largest number of tiles along each side of the picture. Free choice.
-const MOST_ALONG: u32 = 5;
+const MAX_TILES_ALONG: u32 = 5;
 /// Least standard deviation of a tile's luma, levels of 255; below it a tile has no structure. Free choice.
-const LEAST_DEVIATION: f64 = 3.0;
+const MIN_DEVIATION: f64 = 3.0;
 /// Least height of the correlation peak, as a share of the peak of equal tiles. Free choice.
-const LEAST_PEAK: f64 = 0.3;
+const MIN_PEAK: f64 = 0.3;
 /// Least number of tiles with a peak for a shift. Free choice.
-const LEAST_TILES: usize = 4;
+const MIN_TILES: usize = 4;
 /// Least share of the tiles that must agree on a shift, 0..=1. Free choice.
-const AGREEMENT: f64 = 0.6;
+const MIN_AGREEING_SHARE: f64 = 0.6;
 /// Deviation within which a tile agrees, pixels. Free choice.
 const TOLERANCE_PX: f64 = 0.5;
 /// Deviation within which a tile agrees, as a share of the shift, if that is larger. Tiles fade to their
@@ -34,7 +34,7 @@ const TOLERANCE: f64 = 0.35;
 const BANDWIDTH: f64 = 0.2;
 /// Standard deviation of the white noise that damps weak frequencies, levels of 255. Only frequencies well
 /// above it are whitened to equal strength. Free choice.
-const NOISE: f64 = 8.0;
+const NOISE_SIGMA: f64 = 8.0;
 
 /// The tiles of a reference frame that have structure, with their spectra.
 pub(super) struct Correlator {
@@ -44,13 +44,13 @@ pub(super) struct Correlator {
 
 impl Correlator {
     /// Returns a correlator against a reference frame.
-    pub(super) fn of(plate: &Frame) -> Correlator {
+    pub(super) fn new(reference: &Frame) -> Correlator {
         let fourier = Fourier::new();
-        let tiles = tiles(plate.width, plate.height)
+        let tiles = tiles(reference.width, reference.height)
             .into_iter()
             .filter_map(|rect| {
-                let mut tile = fourier.windowed(plate, rect)?;
-                fourier.transform(&mut tile, Way::Forth);
+                let mut tile = fourier.windowed(reference, rect)?;
+                fourier.transform(&mut tile, Direction::Forward);
                 Some((rect, tile))
             })
             .collect();
@@ -60,8 +60,8 @@ impl Correlator {
     /// Returns the shift of each chosen frame from the reference, pixels; `None` where the tiles do not
     /// agree.
     pub(super) fn shifts_px(&self, frames: &[Frame], chosen: &[usize]) -> Vec<Option<[f64; 2]>> {
-        let of = |&k: &usize| self.shift_px(&frames[k]);
-        chosen.par_iter().map(of).collect()
+        let shift_px = |&k: &usize| self.shift_px(&frames[k]);
+        chosen.par_iter().map(shift_px).collect()
     }
 
     /// Returns the shift on which most tiles agree, pixels; `None` when they do not.
@@ -69,13 +69,13 @@ impl Correlator {
         let shifts: Vec<[f64; 2]> = self
             .tiles
             .iter()
-            .filter_map(|(rect, plate)| {
+            .filter_map(|(rect, background)| {
                 let mut tile = self.fourier.windowed(frame, *rect)?;
-                self.fourier.transform(&mut tile, Way::Forth);
-                self.fourier.peak(&tile, plate)
+                self.fourier.transform(&mut tile, Direction::Forward);
+                self.fourier.peak(&tile, background)
             })
             .collect();
-        if shifts.len() < LEAST_TILES {
+        if shifts.len() < MIN_TILES {
             return None;
         }
         let middle = |axis: usize| {
@@ -87,7 +87,7 @@ impl Correlator {
         let tolerance_px = TOLERANCE_PX.max(TOLERANCE * libm::hypot(shift[0], shift[1]));
         let agrees = |s: &&[f64; 2]| libm::hypot(s[0] - shift[0], s[1] - shift[1]) <= tolerance_px;
         let agreeing = shifts.iter().filter(agrees).count() as f64;
-        (agreeing >= AGREEMENT * shifts.len() as f64).then_some(shift)
+        (agreeing >= MIN_AGREEING_SHARE * shifts.len() as f64).then_some(shift)
     }
 }
 
@@ -96,7 +96,7 @@ impl Correlator {
 fn tiles(width: u32, height: u32) -> Vec<Rect> {
     let side = SIDE as u32;
     let along = |length: u32| -> Vec<u32> {
-        let n = (2 * length / side).saturating_sub(1).min(MOST_ALONG);
+        let n = (2 * length / side).saturating_sub(1).min(MAX_TILES_ALONG);
         (0..n)
             .map(|k| (length - side) * (2 * k + 1) / (2 * n))
             .collect()
@@ -121,9 +121,9 @@ struct Complex {
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Way {
-    Forth,
-    Back,
+enum Direction {
+    Forward,
+    Inverse,
 }
 
 /// The Fourier transform of a tile (Cooley & Tukey 1965), with its constant tables.
@@ -140,22 +140,22 @@ struct Fourier {
 
 impl Fourier {
     fn new() -> Fourier {
-        let turn = |k: usize| TAU * k as f64 / SIDE as f64;
+        let angle_rad = |k: usize| TAU * k as f64 / SIDE as f64;
         let frequency = |k: usize| k.min(SIDE - k) as f64 / SIDE as f64 / BANDWIDTH;
         let weights = (0..SIDE * SIDE).map(|at| {
             let (fx, fy) = (frequency(at % SIDE), frequency(at / SIDE));
             libm::exp(-0.5 * (fx * fx + fy * fy))
         });
         let root = |k| Complex {
-            re: libm::cos(turn(k)),
-            im: -libm::sin(turn(k)),
+            re: libm::cos(angle_rad(k)),
+            im: -libm::sin(angle_rad(k)),
         };
-        let hann = |k: usize| 0.5 - 0.5 * libm::cos(turn(k) + TAU / (2 * SIDE) as f64);
+        let hann = |k: usize| 0.5 - 0.5 * libm::cos(angle_rad(k) + TAU / (2 * SIDE) as f64);
         let window: Vec<f64> = (0..SIDE).map(hann).collect();
         let along = window.iter().map(|w| w * w).sum::<f64>();
         Fourier {
             roots: (0..SIDE).map(root).collect(),
-            noise: NOISE * NOISE * along * along,
+            noise: NOISE_SIGMA * NOISE_SIGMA * along * along,
             window,
             weights: weights.collect(),
         }
@@ -171,7 +171,7 @@ impl Fourier {
         let n = (SIDE * SIDE) as f64;
         let mean = (0..SIDE * SIDE).map(level).sum::<f64>() / n;
         let variance = (0..SIDE * SIDE).map(|k| (level(k) - mean) * (level(k) - mean));
-        if variance.sum::<f64>() / n < LEAST_DEVIATION * LEAST_DEVIATION {
+        if variance.sum::<f64>() / n < MIN_DEVIATION * MIN_DEVIATION {
             return None;
         }
         let value = |k: usize| Complex {
@@ -182,23 +182,23 @@ impl Fourier {
     }
 
     /// Transforms the rows, then the columns, in place.
-    fn transform(&self, tile: &mut [Complex], way: Way) {
+    fn transform(&self, tile: &mut [Complex], direction: Direction) {
         for row in tile.chunks_exact_mut(SIDE) {
-            self.transform_line(row, way);
+            self.transform_line(row, direction);
         }
         let mut column = [Complex::default(); SIDE];
         for x in 0..SIDE {
             for (value, y) in column.iter_mut().zip(0..) {
                 *value = tile[y * SIDE + x];
             }
-            self.transform_line(&mut column, way);
+            self.transform_line(&mut column, direction);
             for (value, y) in column.iter().zip(0..) {
                 tile[y * SIDE + x] = *value;
             }
         }
     }
 
-    fn transform_line(&self, line: &mut [Complex], way: Way) {
+    fn transform_line(&self, line: &mut [Complex], direction: Direction) {
         let n_bits = SIDE.trailing_zeros();
         for k in 0..SIDE {
             let reversed = k.reverse_bits() >> (usize::BITS - n_bits);
@@ -212,7 +212,11 @@ impl Fourier {
                 let (low, high) = pair.split_at_mut(half);
                 for (k, (a, b)) in low.iter_mut().zip(high).enumerate() {
                     let root = self.roots[k * SIDE / (2 * half)];
-                    let im = if way == Way::Forth { root.im } else { -root.im };
+                    let im = if direction == Direction::Forward {
+                        root.im
+                    } else {
+                        -root.im
+                    };
                     let turned = Complex {
                         re: b.re * root.re - b.im * im,
                         im: b.re * im + b.im * root.re,
@@ -233,10 +237,10 @@ impl Fourier {
 
     /// Returns the shift of the first spectrum from the second, pixels: the peak of their phase correlation,
     /// refined below one pixel. Returns `None` when the peak is low.
-    fn peak(&self, frame: &[Complex], plate: &[Complex]) -> Option<[f64; 2]> {
+    fn peak(&self, frame: &[Complex], background: &[Complex]) -> Option<[f64; 2]> {
         let mut ideal = 0.0;
         let product = |k: usize| {
-            let (f, p) = (frame[k], plate[k]);
+            let (f, p) = (frame[k], background[k]);
             let (re, im) = (f.re * p.re + f.im * p.im, f.im * p.re - f.re * p.im);
             let length = libm::hypot(re, im);
             let weight = self.weights[k] / (length + self.noise);
@@ -247,10 +251,10 @@ impl Fourier {
             }
         };
         let mut tile: Vec<Complex> = (0..SIDE * SIDE).map(product).collect();
-        self.transform(&mut tile, Way::Back);
+        self.transform(&mut tile, Direction::Inverse);
         let highest = |a: &usize, b: &usize| tile[*a].re.total_cmp(&tile[*b].re);
         let at = (0..SIDE * SIDE).max_by(highest)?;
-        if tile[at].re < LEAST_PEAK * ideal {
+        if tile[at].re < MIN_PEAK * ideal {
             return None;
         }
         let (x, y) = (at % SIDE, at / SIDE);
@@ -312,8 +316,8 @@ mod tests {
     }
 
     #[test]
-    fn a_shift_is_measured_in_any_light() {
-        let correlator = Correlator::of(&scene(0.0, 0.0, 1.0, 0));
+    fn shift_is_measured_in_any_light() {
+        let correlator = Correlator::new(&scene(0.0, 0.0, 1.0, 0));
         for (dx, dy, gain) in [(0.0, 0.0, 1.2), (1.5, -0.7, 1.0), (-4.0, 2.4, 0.8)] {
             let frame = scene(dx, dy, gain, 1);
             let shift = correlator.shift_px(&frame);
@@ -327,22 +331,22 @@ mod tests {
     }
 
     #[test]
-    fn what_shifts_in_a_third_of_the_picture_is_not_the_camera() {
+    fn shift_of_a_third_of_the_picture_is_not_the_camera() {
         let still = scene(0.0, 0.0, 1.0, 0);
         let mut swaying = still.clone();
         let shifted = scene(3.0, 0.0, 1.0, 0);
         for at in (0..320 * 240).filter(|at| at % 320 < 107) {
             swaying.planes[at] = shifted.planes[at];
         }
-        let shift = Correlator::of(&still).shift_px(&swaying);
+        let shift = Correlator::new(&still).shift_px(&swaying);
         assert!(shift.is_none_or(|s| s[0].hypot(s[1]) < 0.3), "{shift:?}");
     }
 
     #[test]
-    fn a_picture_without_structure_says_nothing() {
+    fn flat_picture_has_no_shift() {
         let mut flat = Frame::new(320, 240, ColorSpec::default());
         flat.planes.fill(128);
-        assert!(Correlator::of(&flat).shift_px(&flat).is_none());
+        assert!(Correlator::new(&flat).shift_px(&flat).is_none());
         assert!(tiles(48, 48).is_empty());
     }
 

@@ -2,88 +2,96 @@
 //! state gets its own background (docs/explanation/algorithms.md, "Background").
 //!
 //! A state begins where two neighboring samples differ in much of the picture. Before the comparison, the
-//! light of one is fitted to the other by gains for the whole picture, rows and columns. States that look
-//! alike are merged. Phase correlation (`shift`) then splits a state by camera position. Samples without a
+//! light of one is fitted to the other by gains for the whole picture, rows and columns. States that look alike
+//! are merged. Phase correlation (`camera_shift`) then splits a state by camera position. Samples without a
 //! scene join no state: black frames, title cards, a hand over the lens.
 
-use super::samples::Samples;
-use super::shift::Correlator;
+mod camera_shift;
+
+use self::camera_shift::Correlator;
+use super::samples::{Samples, indices};
 use super::thumbnail::Thumbnail;
 use crate::analysis::Error;
 use crate::order;
 
 /// Share of differing cells above which two samples show different states, 0..=1. Free choice.
-const DIFFERENT: f64 = 0.35;
-/// Neighboring samples must also differ by this multiple of the median share. A moving animal alone makes
-/// twice its area differ. Free choice.
-const UNUSUAL: f64 = 2.5;
+const STATE_MISMATCH: f64 = 0.35;
 /// Least number of samples for a background. Free choice; a median of five already ignores two outliers.
-pub(super) const LEAST_SAMPLES: u32 = 6;
+pub(super) const MIN_SAMPLES: u32 = 6;
 /// Least number of samples at one of several camera positions; with fewer, the camera only passed. Free
 /// choice.
-const LEAST_IN_PLACE: u32 = 8;
+const MIN_AT_POSITION: u32 = 8;
 /// Extra camera positions above which the camera counts as never at rest. Free choice.
-const MOST_MOVES: usize = 3;
+const MAX_MOVES: usize = 3;
 /// Least share of the samples that must belong to a state, 0..=1; with fewer, the footage is refused. Free
 /// choice.
-const LEAST_SHARE: f64 = 0.5;
+const MIN_GROUPED_SHARE: f64 = 0.5;
 /// Shift above which the camera has moved, pixels. Smaller shifts are within the error of the correlation.
-const MOVED_PX: f64 = 0.6;
+const MIN_SHIFT_PX: f64 = 0.6;
 /// Samples checked for a shift before all samples are. Free choice.
-const N_CHECKED: usize = 21;
+const N_SHIFT_CHECKS: usize = 21;
 
 /// The samples of one state that one background describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Part {
+pub(super) struct SampleGroup {
     /// The samples; bit k is sample k.
     pub(super) samples: u64,
-    /// Index of the light. Colors are comparable between parts of equal light.
+    /// All samples of the state, of which `samples` may be a time window.
+    pub(super) state_samples: u64,
+    /// Index of the light. Colors are comparable between groups of equal light.
     pub(super) light: usize,
 }
 
-/// Groups the samples into parts, those with the most samples first.
+impl SampleGroup {
+    /// Returns the group of all samples of a state.
+    pub(super) fn of_state(samples: u64, light: usize) -> SampleGroup {
+        SampleGroup {
+            samples,
+            state_samples: samples,
+            light,
+        }
+    }
+}
+
+/// Groups the samples by state; returns the groups with the most samples first.
 ///
-/// Fails if more than half of the samples belong to no part, with the reason and the time at which the
+/// Fails if more than half of the samples belong to no group, with the reason and the time at which the
 /// problem begins.
-pub(super) fn sort(samples: &Samples) -> Result<Vec<Part>, Error> {
+pub(super) fn group_samples(samples: &Samples) -> Result<Vec<SampleGroup>, Error> {
     let thumbnails = samples.thumbnails();
     let segments = segments(&thumbnails);
     let n_samples = samples.frames.len() as u32;
     let (mut kept, mut dropped) = (Vec::new(), Vec::new());
-    for (light, of_light) in alike(&thumbnails, segments).into_iter().enumerate() {
-        let places = places(samples, of_light);
-        let least = if places.len() > 1 {
-            LEAST_IN_PLACE
+    for (light, of_state) in merge_alike(&thumbnails, segments).into_iter().enumerate() {
+        let positions = camera_positions(samples, of_state);
+        let least = if positions.len() > 1 {
+            MIN_AT_POSITION
         } else {
-            LEAST_SAMPLES
+            MIN_SAMPLES
         };
-        for of_place in places {
-            let part = Part {
-                samples: of_place,
-                light,
-            };
-            match part.samples.count_ones() >= least.min(n_samples.div_ceil(2)) {
-                true => kept.push(part),
-                false => dropped.push(part),
+        for samples in positions {
+            let group = SampleGroup::of_state(samples, light);
+            if samples.count_ones() >= least.min(n_samples.div_ceil(2)) {
+                kept.push(group);
+            } else {
+                dropped.push(group);
             }
         }
     }
-    let n_kept: u32 = kept.iter().map(|part| part.samples.count_ones()).sum();
-    if f64::from(n_kept) < LEAST_SHARE * f64::from(n_samples) {
-        return Err(reason(samples, &thumbnails, &dropped));
+    let n_kept: u32 = kept.iter().map(|group| group.samples.count_ones()).sum();
+    if f64::from(n_kept) < MIN_GROUPED_SHARE * f64::from(n_samples) {
+        return Err(refusal(samples, &thumbnails, &dropped));
     }
-    kept.sort_by_key(|part| (std::cmp::Reverse(part.samples.count_ones()), part.samples));
+    kept.sort_by_key(|group| (std::cmp::Reverse(group.samples.count_ones()), group.samples));
     Ok(kept)
 }
 
-/// Returns runs of neighboring samples in one state, as bits. Blank samples belong to no run.
+/// Returns runs of neighboring samples in one state, one bit each. Blank samples belong to no run.
 fn segments(thumbnails: &[Thumbnail]) -> Vec<u64> {
     let steps: Vec<f64> = thumbnails
         .windows(2)
         .map(|pair| pair[0].mismatch(&pair[1]))
         .collect();
-    let usual = order::median(steps.iter().copied()).unwrap_or(0.0);
-    let limit = DIFFERENT.max(UNUSUAL * usual);
     // Footage of a bare wall looks blank without the animal. There, blank samples show the scene.
     let n_blank = thumbnails
         .iter()
@@ -91,30 +99,30 @@ fn segments(thumbnails: &[Thumbnail]) -> Vec<u64> {
         .count();
     let is_wall = 2 * n_blank > thumbnails.len();
     let mut segments: Vec<u64> = Vec::new();
-    let mut goes_on = false;
+    let mut continues = false;
     for (k, thumbnail) in thumbnails.iter().enumerate() {
         if thumbnail.is_blank() && !is_wall {
-            goes_on = false;
+            continues = false;
             continue;
         }
-        goes_on &= steps[k.max(1) - 1] <= limit;
-        match segments.last_mut().filter(|_| goes_on) {
+        continues &= steps[k.max(1) - 1] <= STATE_MISMATCH;
+        match segments.last_mut().filter(|_| continues) {
             Some(segment) => *segment |= 1 << k,
             None => segments.push(1 << k),
         }
-        goes_on = true;
+        continues = true;
     }
     segments
 }
 
 /// Merges the segments that look alike.
-fn alike(thumbnails: &[Thumbnail], segments: Vec<u64>) -> Vec<u64> {
+fn merge_alike(thumbnails: &[Thumbnail], segments: Vec<u64>) -> Vec<u64> {
     let mut states: Vec<(u64, Thumbnail)> = Vec::new();
     for segment in segments {
-        let typical = Thumbnail::median(bits(segment).map(|k| &thumbnails[k]));
+        let typical = Thumbnail::median(indices(segment).map(|k| &thumbnails[k]));
         let known = states
             .iter_mut()
-            .find(|(_, state)| state.mismatch(&typical) <= DIFFERENT);
+            .find(|(_, state)| state.mismatch(&typical) <= STATE_MISMATCH);
         match known {
             Some((samples, _)) => *samples |= segment,
             None => states.push((segment, typical)),
@@ -124,12 +132,12 @@ fn alike(thumbnails: &[Thumbnail], segments: Vec<u64>) -> Vec<u64> {
 }
 
 /// Splits the samples of a state by camera position.
-fn places(samples: &Samples, state: u64) -> Vec<u64> {
-    let members: Vec<usize> = bits(state).collect();
-    let correlator = Correlator::of(&samples.frames[members[members.len() / 2]]);
-    let step = members.len().div_ceil(N_CHECKED);
+fn camera_positions(samples: &Samples, state: u64) -> Vec<u64> {
+    let members: Vec<usize> = indices(state).collect();
+    let correlator = Correlator::new(&samples.frames[members[members.len() / 2]]);
+    let step = members.len().div_ceil(N_SHIFT_CHECKS);
     let checked: Vec<usize> = members.iter().copied().step_by(step).collect();
-    let has_moved = |shift: &Option<[f64; 2]>| shift.is_some_and(|s| length(s) > MOVED_PX);
+    let has_moved = |shift: &Option<[f64; 2]>| shift.is_some_and(|s| length(s) > MIN_SHIFT_PX);
     if !correlator
         .shifts_px(&samples.frames, &checked)
         .iter()
@@ -137,7 +145,7 @@ fn places(samples: &Samples, state: u64) -> Vec<u64> {
     {
         return vec![state];
     }
-    let mut places: Vec<(u64, Vec<[f64; 2]>)> = Vec::new();
+    let mut positions: Vec<(u64, Vec<[f64; 2]>)> = Vec::new();
     let mut here = 0;
     for (&k, shift) in members
         .iter()
@@ -145,7 +153,7 @@ fn places(samples: &Samples, state: u64) -> Vec<u64> {
     {
         let Some(shift) = shift else {
             // A sample with unknown shift most likely shares its neighbor's position.
-            if let Some((samples, _)) = places.get_mut(here) {
+            if let Some((samples, _)) = positions.get_mut(here) {
                 *samples |= 1 << k;
             }
             continue;
@@ -154,31 +162,35 @@ fn places(samples: &Samples, state: u64) -> Vec<u64> {
             let middle = [0, 1].map(|c| order::median(shifts.iter().map(|s| s[c])).unwrap_or(0.0));
             length([shift[0] - middle[0], shift[1] - middle[1]])
         };
-        let nearest =
-            (0..places.len()).min_by(|&a, &b| off(&places[a].1).total_cmp(&off(&places[b].1)));
-        here = match nearest.filter(|&at| off(&places[at].1) <= MOVED_PX) {
+        let nearest = (0..positions.len())
+            .min_by(|&a, &b| off(&positions[a].1).total_cmp(&off(&positions[b].1)));
+        here = match nearest.filter(|&at| off(&positions[at].1) <= MIN_SHIFT_PX) {
             Some(at) => at,
             None => {
-                places.push((0, Vec::new()));
-                places.len() - 1
+                positions.push((0, Vec::new()));
+                positions.len() - 1
             }
         };
-        places[here].0 |= 1 << k;
-        places[here].1.push(shift);
+        positions[here].0 |= 1 << k;
+        positions[here].1.push(shift);
     }
-    places.into_iter().map(|(samples, _)| samples).collect()
+    positions.into_iter().map(|(samples, _)| samples).collect()
 }
 
 /// Returns the reason for which too few samples show a measurable scene, and the time of the first change.
-fn reason(samples: &Samples, thumbnails: &[Thumbnail], dropped: &[Part]) -> Error {
-    let n_lights = dropped.iter().map(|part| part.light + 1).max().unwrap_or(0);
+fn refusal(samples: &Samples, thumbnails: &[Thumbnail], dropped: &[SampleGroup]) -> Error {
+    let n_lights = dropped
+        .iter()
+        .map(|group| group.light + 1)
+        .max()
+        .unwrap_or(0);
     let first_change = dropped
         .iter()
-        .map(|part| part.samples.trailing_zeros())
+        .map(|group| group.samples.trailing_zeros())
         .filter(|&k| k > 0)
         .min();
     let at_s = samples.time_s(first_change.unwrap_or(0) as usize);
-    if n_lights + MOST_MOVES < dropped.len() {
+    if n_lights + MAX_MOVES < dropped.len() {
         return Error::BackgroundNotStatic { at_s, box_px: None };
     }
     if n_lights < dropped.len() {
@@ -188,17 +200,13 @@ fn reason(samples: &Samples, thumbnails: &[Thumbnail], dropped: &[Part]) -> Erro
         .windows(2)
         .filter(|pair| pair[0].correlation(&pair[1]) > 0.5)
         .count();
-    match 2 * same_structure > thumbnails.len() {
-        true => Error::LightChanges { at_s },
-        false => Error::SceneChanges { at_s },
+    if 2 * same_structure > thumbnails.len() {
+        Error::LightChanges { at_s }
+    } else {
+        Error::SceneChanges { at_s }
     }
 }
 
 fn length([x, y]: [f64; 2]) -> f64 {
     libm::hypot(x, y)
-}
-
-/// Returns the indices of the set bits, in ascending order.
-pub(super) fn bits(mask: u64) -> impl Iterator<Item = usize> + Clone {
-    (0..64).filter(move |k| mask >> k & 1 == 1)
 }

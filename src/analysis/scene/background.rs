@@ -1,18 +1,19 @@
 //! The background: a picture of the scene without the animal, and the noise of each of its pixels
 //! (docs/explanation/algorithms.md, "Light and noise").
 //!
-//! A [`Plate`] also holds all that a frame is compared by: thresholds, light probes and block means.
-//! Estimating the picture is the task of `draft`.
+//! A [`Background`] also holds all that a frame is compared by: thresholds, light probes and block means.
+//! `background_estimate` makes the picture.
 
-use super::light;
+use super::probes::{self, Probe};
 use crate::analysis::silhouette::Blocks;
+use crate::geometry::Rect;
 use crate::raster::{Frame, RgbImage};
 
 /// Least noise of a pixel, levels of 255. A lossy codec hides noise of the background. Free choice.
-pub(super) const SIGMA_FLOOR: f32 = 1.5;
+pub(super) const MIN_SIGMA: f32 = 1.5;
 
 /// The background: the scene without the animal.
-pub struct Plate {
+pub struct Background {
     /// The picture, in the decoder's format.
     pub frame: Frame,
     /// The background in RGB.
@@ -23,12 +24,12 @@ pub struct Plate {
     /// Noise of each pixel, levels of 255: one standard deviation in the noisiest of R, G and B.
     pub sigma: Vec<f32>,
     /// Difference above which a pixel certainly is foreground, levels of 255: at least the threshold and 4
-    /// sigma. `draft` raises it for an animal of high contrast.
+    /// sigma. `background_estimate` raises it for an animal of high contrast.
     pub core_threshold: Vec<u8>,
     /// Share of `core_threshold` above which a pixel beside a certain one counts, 0..=1.
     pub weak_share: f32,
     /// The pixels at which the light of frames is measured.
-    pub probes: Vec<light::Probe>,
+    pub probes: Vec<Probe>,
     /// Means and noise of 4 x 4 blocks, which propose boxes for a full comparison.
     pub blocks: Blocks,
     /// Whether the light of frames varies over the picture.
@@ -45,7 +46,7 @@ pub struct Threshold {
     /// Least core threshold, levels of 255. A pixel of more noise has 4 sigma instead.
     pub core: u8,
     /// Largest core threshold, levels of 255.
-    pub most: u8,
+    pub max: u8,
     /// Share of the core threshold above which a pixel beside a certain one counts, 0..=1.
     pub weak_share: f32,
 }
@@ -56,7 +57,7 @@ impl Threshold {
     pub const fn usual(core: u8) -> Threshold {
         Threshold {
             core,
-            most: u8::MAX,
+            max: u8::MAX,
             weak_share: 0.5,
         }
     }
@@ -67,21 +68,21 @@ impl Threshold {
     pub const fn raised(core: u8) -> Threshold {
         Threshold {
             core,
-            most: core.saturating_mul(2),
+            max: core.saturating_mul(2),
             weak_share: 1.0,
         }
     }
 }
 
-impl Plate {
+impl Background {
     /// Returns a background from a picture and the noise of its pixels, under the usual threshold.
-    pub(in crate::analysis) fn of(frame: Frame, sigma: Vec<f32>, threshold: u8) -> Plate {
+    pub(in crate::analysis) fn new(frame: Frame, sigma: Vec<f32>, threshold: u8) -> Background {
         let rgb = frame.to_rgb();
-        Plate {
-            probes: light::probes(&rgb),
+        Background {
+            probes: probes::of_background(&rgb),
             rgb,
             core_threshold: core_thresholds(&sigma, Threshold::usual(threshold)),
-            blocks: Blocks::of(&frame),
+            blocks: Blocks::new(&frame),
             frame,
             other: None,
             sigma,
@@ -93,15 +94,34 @@ impl Plate {
     }
 
     /// Returns a background from a picture, with the least noise at every pixel.
-    pub(super) fn without_noise(frame: Frame, threshold: u8) -> Plate {
+    pub(super) fn without_noise(frame: Frame, threshold: u8) -> Background {
         let n_px = frame.luma().len();
-        Plate::of(frame, vec![SIGMA_FLOOR; n_px], threshold)
+        Background::new(frame, vec![MIN_SIGMA; n_px], threshold)
+    }
+
+    /// Replaces the picture; noise and thresholds stay.
+    pub(super) fn set_picture(&mut self, frame: Frame) {
+        self.rgb = frame.to_rgb();
+        self.probes = probes::of_background(&self.rgb);
+        self.blocks = Blocks::new(&frame);
+        self.frame = frame;
     }
 
     /// Sets the thresholds of all pixels.
     pub(super) fn set_threshold(&mut self, threshold: Threshold) {
         self.core_threshold = core_thresholds(&self.sigma, threshold);
         self.weak_share = threshold.weak_share;
+    }
+
+    /// Returns the index in the picture of pixel `k` of a box.
+    pub fn px_in(&self, rect: Rect, k: usize) -> usize {
+        let width = rect.w as usize;
+        (rect.y as usize + k / width) * self.frame.width as usize + rect.x as usize + k % width
+    }
+
+    /// Returns the color of a pixel, levels of 255.
+    pub fn color(&self, px: usize) -> [f32; 3] {
+        [0, 1, 2].map(|c| f32::from(self.rgb.pixels[3 * px + c]))
     }
 
     /// Returns the difference above which a pixel beside a certain one counts, levels of 255.
@@ -111,7 +131,7 @@ impl Plate {
 }
 
 fn core_thresholds(sigma: &[f32], threshold: Threshold) -> Vec<u8> {
-    let [least, most] = [threshold.core, threshold.most].map(f32::from);
-    let of = |s: &f32| (4.0 * s).max(least).min(most) as u8;
-    sigma.iter().map(of).collect()
+    let [min, max] = [threshold.core, threshold.max].map(f32::from);
+    let at_pixel = |s: &f32| (4.0 * s).max(min).min(max) as u8;
+    sigma.iter().map(at_pixel).collect()
 }

@@ -5,24 +5,24 @@
 
 use std::ops::RangeInclusive;
 
-use crate::analysis::scene::plate::Plate;
+use crate::analysis::scene::background::Background;
 use crate::analysis::silhouette::{Difference, shadow};
 use crate::order::{median, percentile};
 use crate::raster::Mask;
 
 /// A pixel is faint when it differs by less than this share of the difference of the starkest pixels. Free
 /// choice.
-const FAINT: f64 = 0.3;
+const FAINT_SHARE: f64 = 0.3;
 /// A pixel has the coat's color when it differs from it by less than this share of its difference from the
 /// background. Free choice.
-const MATCH: f64 = 0.25;
+const MATCH_SHARE: f64 = 0.25;
 /// Brightness of a shadow as a share of the background's. Free choice.
-const SHADOW: RangeInclusive<f32> = 0.45..=1.0;
+const SHADOW_BRIGHTNESS: RangeInclusive<f32> = 0.45..=1.0;
 
 /// The animal's appearance where it differs most from the background.
 pub(super) struct Coat<'a> {
     difference: &'a Difference,
-    plate: &'a Plate,
+    background: &'a Background,
     /// 75th percentile of the differences from the background, levels of 255. A mean would sink with the
     /// shadow.
     starkest: f64,
@@ -33,10 +33,14 @@ pub(super) struct Coat<'a> {
 }
 
 impl Coat<'_> {
-    pub(super) fn of<'a>(mask: &Mask, difference: &'a Difference, plate: &'a Plate) -> Coat<'a> {
+    pub(super) fn measure<'a>(
+        mask: &Mask,
+        difference: &'a Difference,
+        background: &'a Background,
+    ) -> Coat<'a> {
         let mut coat = Coat {
             difference,
-            plate,
+            background,
             starkest: 0.0,
             starkest_share: 0.0,
             color: [0.0; 3],
@@ -56,9 +60,10 @@ impl Coat<'_> {
     ///
     /// The other one contains too much of a mirror image in a dark wall, or of a shadow on a brighter floor.
     pub(super) fn or_starker(self, other: Self) -> Self {
-        match other.starkest > self.starkest {
-            true => other,
-            false => self,
+        if other.starkest > self.starkest {
+            other
+        } else {
+            self
         }
     }
 
@@ -71,45 +76,45 @@ impl Coat<'_> {
     ///
     /// A shadow differs by more levels where the floor is brighter; the share stays equal.
     fn share(&self, k: usize) -> f64 {
-        let (rect, width) = (self.difference.rect, self.difference.rect.w as usize);
-        let (x, y) = ((k % width) as u32, (k / width) as u32);
-        let seen = self.difference.rgb.pixel(x, y);
-        let back = self.plate.rgb.pixel(rect.x + x, rect.y + y);
-        let brightest = seen.into_iter().chain(back).fold(1, u8::max);
+        let seen = &self.difference.rgb.pixels[3 * k..3 * k + 3];
+        let px = self.background.px_in(self.difference.rect, k);
+        let back = &self.background.rgb.pixels[3 * px..3 * px + 3];
+        let brightest = seen
+            .iter()
+            .chain(back)
+            .fold(1, |most, &value| value.max(most));
         self.level(k) / f64::from(brightest)
     }
 
     /// Returns whether a pixel differs much less from the background than the starkest pixels.
-    pub(super) fn is_faint(&self, k: usize) -> bool {
-        self.level(k) < FAINT * self.starkest || self.share(k) < FAINT * self.starkest_share
+    fn is_faint(&self, k: usize) -> bool {
+        self.level(k) < FAINT_SHARE * self.starkest
+            || self.share(k) < FAINT_SHARE * self.starkest_share
     }
 
     /// Returns whether a pixel has the coat's color: it is much nearer to it than to the background.
-    pub(super) fn matches(&self, k: usize) -> bool {
+    fn matches(&self, k: usize) -> bool {
         let seen = &self.difference.rgb.pixels[3 * k..3 * k + 3];
-        let off = seen.iter().zip(self.color);
-        let most_off = off.fold(0.0, |most, (&seen, color)| {
+        let differences = seen.iter().zip(self.color);
+        let max_difference = differences.fold(0.0, |most, (&seen, color)| {
             f64::max(most, (f64::from(seen) - color).abs())
         });
-        most_off < MATCH * self.level(k)
+        max_difference < MATCH_SHARE * self.level(k)
     }
 
     /// Returns whether a faint pixel has the background's color, but darker.
     pub(super) fn is_shadow(&self, k: usize) -> bool {
-        let width = self.difference.rect.w as usize;
         self.is_faint(k)
             && !self.matches(k)
-            && shadow::has_darker_color(self.difference, self.plate, k % width, k / width, SHADOW)
+            && shadow::has_darker_color(self.difference, self.background, k, SHADOW_BRIGHTNESS)
     }
 
     /// Returns whether a faint pixel cannot be told from the background.
     fn is_floor(&self, k: usize) -> bool {
-        let (rect, width) = (self.difference.rect, self.difference.rect.w as usize);
-        let (x, y) = (rect.x as usize + k % width, rect.y as usize + k / width);
-        let at = y * self.plate.frame.width as usize + x;
+        let px = self.background.px_in(self.difference.rect, k);
         self.is_faint(k)
             && !self.matches(k)
-            && self.difference.levels[k] <= self.plate.weak_threshold(at)
+            && self.difference.levels[k] <= self.background.weak_threshold(px)
     }
 
     /// Returns the mask without the soft shadow around the animal and without the floor between its parts.
@@ -121,7 +126,7 @@ impl Coat<'_> {
         for (k, bit) in solid.bits.iter_mut().enumerate() {
             *bit &= u8::from(!self.is_shadow(k) && !self.is_floor(k));
         }
-        add_midst(&mut solid, 2 * band_px);
+        add_enclosed(&mut solid, 2 * band_px);
         solid.majority()
     }
 }
@@ -129,15 +134,15 @@ impl Coat<'_> {
 /// Sets the pixels that are enclosed by parts more than twice `reach_px` thick.
 ///
 /// Thinner parts enclose nothing: a tail and its shadow may meet around a patch of floor.
-fn add_midst(solid: &mut Mask, reach_px: u32) {
+fn add_enclosed(solid: &mut Mask, reach_px: u32) {
     let mut filled = solid.clone();
     filled.fill_holes();
     if filled == *solid {
         return;
     }
-    let mut midst = solid.eroded_by(reach_px);
-    midst.fill_holes();
-    for (bit, within) in solid.bits.iter_mut().zip(midst.dilated_by(reach_px).bits) {
-        *bit |= within;
+    let mut thick = solid.eroded_by(reach_px);
+    thick.fill_holes();
+    for (bit, enclosed) in solid.bits.iter_mut().zip(thick.dilated_by(reach_px).bits) {
+        *bit |= enclosed;
     }
 }

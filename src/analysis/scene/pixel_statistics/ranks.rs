@@ -5,11 +5,11 @@
 //! the samples below a candidate, for 64 neighboring pixels at once, in loops that the compiler vectorizes.
 //! Samples that are left out hold 255, so no candidate exceeds them.
 
-/// Largest number of samples: one bit each in a 64-bit word.
-pub(super) const MOST: usize = 64;
+use crate::analysis::scene::samples::MAX_SAMPLES;
+
 /// Largest difference between values of an unchanged scene, levels of 255. It covers noise and residual
 /// flicker. Free choice.
-const NEAR: u8 = 10;
+const SAME_LEVELS: u8 = 10;
 /// Pixels searched at once.
 const LANES: usize = 64;
 
@@ -37,15 +37,15 @@ impl Wanted {
 
 /// Writes the wanted value of each pixel to `row`; 255 where no sample is free.
 ///
-/// `samples` holds the same row of each sample, at most [`MOST`]. With `bases`, one row for each sample, the
-/// absolute differences from `bases` are ranked instead.
-pub(super) fn ranked(
+/// `samples` holds the same row of each sample, at most [`MAX_SAMPLES`]. With `bases`, one row for each
+/// sample, the absolute differences from `bases` are ranked instead.
+pub(super) fn write_ranked(
     samples: &[&[u8]],
     bases: Option<&[&[u8]]>,
     wanted: &[Wanted],
     row: &mut [u8],
 ) {
-    let mut values = [[0; LANES]; MOST];
+    let mut values = [[0; LANES]; MAX_SAMPLES];
     for start in (0..row.len()).step_by(LANES) {
         let n = LANES.min(row.len() - start);
         let values = &mut values[..samples.len()];
@@ -58,7 +58,7 @@ pub(super) fn ranked(
             }
         }
         let wanted = &wanted[start..start + n];
-        leave_out(values, wanted);
+        mask_excluded(values, wanted);
         let mut ranks = [0; LANES];
         for (rank, wanted) in ranks.iter_mut().zip(wanted) {
             *rank = wanted.rank;
@@ -69,13 +69,13 @@ pub(super) fn ranked(
 
 /// Narrows `wanted` to the free samples near the commonest value of each pixel, and asks for their median.
 ///
-/// The center is the free sample with the most free samples within `NEAR` levels. Only those within `NEAR` of
-/// it stay. The scene keeps its color while passing objects vary, so this finds the scene even where objects
-/// cover it most of the time.
-pub(super) fn want_commonest(samples: &[&[u8]], wanted: &mut [Wanted]) {
+/// The center is the free sample with the most free samples within `SAME_LEVELS`. Only those within
+/// `SAME_LEVELS` of it stay. The scene keeps its color while passing objects vary, so this finds the scene even
+/// where objects cover it most of the time.
+pub(super) fn narrow_to_commonest(samples: &[&[u8]], wanted: &mut [Wanted]) {
     for (start, wanted) in (0..).step_by(LANES).zip(wanted.chunks_mut(LANES)) {
-        let mut values = [[0; LANES]; MOST];
-        let mut free = [[0u8; LANES]; MOST];
+        let mut values = [[0; LANES]; MAX_SAMPLES];
+        let mut free = [[0u8; LANES]; MAX_SAMPLES];
         for (k, sample) in samples.iter().enumerate() {
             values[k][..wanted.len()].copy_from_slice(&sample[start..start + wanted.len()]);
             for (free, wanted) in free[k].iter_mut().zip(&*wanted) {
@@ -88,7 +88,7 @@ pub(super) fn want_commonest(samples: &[&[u8]], wanted: &mut [Wanted]) {
             for (other, free) in values.iter().zip(&free).take(samples.len()) {
                 for (((count, own), other), free) in count.iter_mut().zip(own).zip(other).zip(free)
                 {
-                    *count += u8::from(own.abs_diff(*other) <= NEAR) & free;
+                    *count += u8::from(own.abs_diff(*other) <= SAME_LEVELS) & free;
                 }
             }
             for lane in 0..LANES {
@@ -99,7 +99,7 @@ pub(super) fn want_commonest(samples: &[&[u8]], wanted: &mut [Wanted]) {
             }
         }
         for (lane, wanted) in wanted.iter_mut().enumerate() {
-            let near = |k: &usize| values[*k][lane].abs_diff(commonest[lane]) <= NEAR;
+            let near = |k: &usize| values[*k][lane].abs_diff(commonest[lane]) <= SAME_LEVELS;
             let near: u64 = (0..samples.len()).filter(near).map(|k| 1 << k).sum();
             *wanted = Wanted::median(wanted.free & near);
         }
@@ -107,8 +107,8 @@ pub(super) fn want_commonest(samples: &[&[u8]], wanted: &mut [Wanted]) {
 }
 
 /// Sets the values that do not count to 255.
-fn leave_out(values: &mut [Lanes], wanted: &[Wanted]) {
-    let all = u64::MAX >> (MOST - values.len());
+fn mask_excluded(values: &mut [Lanes], wanted: &[Wanted]) {
+    let all = u64::MAX >> (MAX_SAMPLES - values.len());
     if wanted.iter().all(|w| w.free == all) {
         return;
     }
@@ -159,9 +159,9 @@ mod tests {
         let samples: Vec<Vec<u8>> = (0..64).map(|k| vec![value(k); 70]).collect();
         let rows: Vec<&[u8]> = samples.iter().map(Vec::as_slice).collect();
         let mut wanted = vec![Wanted::median(u64::MAX << 4); 70];
-        want_commonest(&rows, &mut wanted);
+        narrow_to_commonest(&rows, &mut wanted);
         let mut row = vec![0; 70];
-        ranked(&rows, None, &wanted, &mut row);
+        write_ranked(&rows, None, &wanted, &mut row);
         assert!(
             row.iter().all(|value| (120..=123).contains(value)),
             "{row:?}"
@@ -171,21 +171,21 @@ mod tests {
     proptest! {
         #[test]
         fn the_value_is_that_of_the_sorted_free_samples(
-            n in 1usize..=MOST, width in 1usize..150, seed: u64, levels in 1u64..256,
+            n in 1usize..=MAX_SAMPLES, width in 1usize..150, seed: u64, levels in 1u64..256,
         ) {
             let byte = |k: usize, x: usize| (crate::random::bits(seed, &[k as u64, x as u64]) % levels) as u8;
             let samples: Vec<Vec<u8>> = (0..n).map(|k| (0..width).map(|x| byte(k, x)).collect()).collect();
             let rows: Vec<&[u8]> = samples.iter().map(Vec::as_slice).collect();
-            let base: Vec<u8> = (0..width).map(|x| byte(MOST, x)).collect();
+            let base: Vec<u8> = (0..width).map(|x| byte(MAX_SAMPLES, x)).collect();
             let wanted: Vec<Wanted> = (0..width).map(|x| {
-                let free = crate::random::bits(seed, &[x as u64]) & u64::MAX >> (MOST - n);
+                let free = crate::random::bits(seed, &[x as u64]) & u64::MAX >> (MAX_SAMPLES - n);
                 let rank = crate::random::bits(seed, &[x as u64, 7]) % u64::from(free.count_ones().max(1));
                 Wanted { free, rank: rank as u8 }
             }).collect();
             let mut row = vec![0; width];
             for base in [None, Some(base.as_slice())] {
                 let bases: Option<Vec<&[u8]>> = base.map(|base| vec![base; n]);
-                ranked(&rows, bases.as_deref(), &wanted, &mut row);
+                write_ranked(&rows, bases.as_deref(), &wanted, &mut row);
                 for x in 0..width {
                     let mut free: Vec<u8> = (0..n)
                         .filter(|k| wanted[x].free >> k & 1 == 1)
