@@ -116,7 +116,7 @@ mod tests {
     fn frame([darkest, brightest]: [f64; 2], has_disc: bool) -> Frame {
         let mut picture = RgbImage::new(SIZE, SIZE);
         for (y, x) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (y, x))) {
-            let chip = random::unit(3, &[u64::from(x / 2), u64::from(y / 2)]);
+            let chip = random::uniform(3, &[u64::from(x / 2), u64::from(y / 2)]);
             let level = darkest + (brightest - darkest) * chip;
             let covered = if has_disc { in_disc(x, y) } else { 0.0 };
             let level = covered * 40.0 + (1.0 - covered) * level;

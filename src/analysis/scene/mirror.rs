@@ -5,7 +5,6 @@
 //! varies.
 
 use crate::analysis::subject::Look;
-use crate::geometry::Rect;
 use crate::order::median;
 use crate::raster::runs::{self, Component};
 
@@ -101,6 +100,7 @@ impl Mirror {
 mod tests {
     use super::*;
     use crate::analysis::subject::Color;
+    use crate::geometry::Rect;
     use crate::raster::Mask;
 
     fn look(centroid_px: [f64; 2], contrast: f64) -> Look {
