@@ -24,7 +24,7 @@ type Settings = BTreeMap<String, String>;
 /// Parses the arguments, with defaults from the settings file if there is one. Fails if the file is invalid.
 /// If the arguments are invalid or ask for help, clap prints a message and ends the process.
 pub fn parse(arguments: &[OsString]) -> Result<Cli, Error> {
-    let file = named_in(arguments).or_else(|| std::env::var_os(VARIABLE).map(PathBuf::from));
+    let file = path_in(arguments).or_else(|| std::env::var_os(VARIABLE).map(PathBuf::from));
     let command = match file {
         Some(file) => with_defaults(Cli::command(), &read(&file)?),
         None => Cli::command(),
@@ -34,29 +34,29 @@ pub fn parse(arguments: &[OsString]) -> Result<Cli, Error> {
 }
 
 /// Returns the file of the last `--config FILE` or `--config=FILE`.
-fn named_in(arguments: &[OsString]) -> Option<PathBuf> {
+fn path_in(arguments: &[OsString]) -> Option<PathBuf> {
     let flags = arguments
         .iter()
         .enumerate()
         .take_while(|(_, flag)| *flag != "--");
-    let named = flags.filter_map(|(idx, flag)| match flag.to_str()? {
+    let paths = flags.filter_map(|(idx, flag)| match flag.to_str()? {
         "--config" => arguments.get(idx + 1).map(PathBuf::from),
         flag => flag.strip_prefix("--config=").map(PathBuf::from),
     });
-    named.last()
+    paths.last()
 }
 
 /// Reads the file. Fails if it is no TOML, or has an unknown setting or an invalid value.
 fn read(file: &Path) -> Result<Settings, Error> {
-    let wrong = |what: &str| Error::Usage(format!("{what}: {}", file.display()));
+    let invalid = |what: &str| Error::Usage(format!("{what}: {}", file.display()));
     let text = std::fs::read_to_string(file);
-    let text = text.map_err(|error| wrong(&format!("the settings cannot be read: {error}")))?;
+    let text = text.map_err(|error| invalid(&format!("the settings cannot be read: {error}")))?;
     let table: Table = (text.parse()).map_err(|error: toml::de::Error| {
         let line = text[..error.span().map_or(0, |span| span.start)]
             .matches('\n')
             .count()
             + 1;
-        wrong(&format!(
+        invalid(&format!(
             "line {line} is not valid TOML: {}",
             error.message()
         ))
@@ -66,12 +66,12 @@ fn read(file: &Path) -> Result<Settings, Error> {
     for (key, value) in table {
         let id = key.replace('-', "_");
         let Some((flag, is_switch)) = known.get(&id) else {
-            return Err(wrong(&format!("the setting {key} is unknown, in")));
+            return Err(invalid(&format!("the setting {key} is unknown, in")));
         };
-        let text = text_of(&value, *is_switch);
+        let text = to_text(&value, *is_switch);
         let text =
-            text.ok_or_else(|| wrong(&format!("the value of {key} has the wrong type, in")))?;
-        check(flag, &text, *is_switch).map_err(|why| wrong(&format!("{key}: {why}, in")))?;
+            text.ok_or_else(|| invalid(&format!("the value of {key} has the wrong type, in")))?;
+        check(flag, &text, *is_switch).map_err(|why| invalid(&format!("{key}: {why}, in")))?;
         settings.insert(id, text);
     }
     Ok(settings)
@@ -95,7 +95,7 @@ fn settings_of(command: &Command) -> BTreeMap<String, (String, bool)> {
     known
 }
 
-fn text_of(value: &Value, is_switch: bool) -> Option<String> {
+fn to_text(value: &Value, is_switch: bool) -> Option<String> {
     match value {
         Value::Boolean(on) => is_switch.then(|| on.to_string()),
         Value::String(text) if !is_switch => Some(text.clone()),
@@ -112,8 +112,8 @@ fn check(flag: &str, text: &str, is_switch: bool) -> Result<(), String> {
         (true, _) => Vec::new(),
     };
     let arguments = ["flockreel", "serve"].into_iter().map(str::to_owned);
-    let taken = Cli::command().try_get_matches_from(arguments.chain(given));
-    let Err(error) = taken else {
+    let result = Cli::command().try_get_matches_from(arguments.chain(given));
+    let Err(error) = result else {
         return Ok(());
     };
     let sentence = error.to_string();
@@ -142,7 +142,7 @@ mod tests {
     fn config_file_is_found_among_the_arguments() {
         let of = |line: &str| {
             let arguments: Vec<OsString> = line.split(' ').map(OsString::from).collect();
-            named_in(&arguments)
+            path_in(&arguments)
         };
         assert_eq!(of("flockreel serve --config a.toml"), Some("a.toml".into()));
         assert_eq!(

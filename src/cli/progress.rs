@@ -52,17 +52,17 @@ impl Progress for Listener {
         let Ok(mut last) = self.last.lock() else {
             return;
         };
-        let fresh_stage = last.0 != stage;
-        let fresh_step = fresh_stage || last.1 < step;
-        *last = (stage, if fresh_stage { step } else { last.1.max(step) });
+        let is_new_stage = last.0 != stage;
+        let is_new_step = is_new_stage || last.1 < step;
+        *last = (stage, if is_new_stage { step } else { last.1.max(step) });
         match &self.bar {
             Some(bar) => {
-                if fresh_stage {
+                if is_new_stage {
                     bar.set_message(stage);
                 }
                 bar.set_position((fraction * TICKS as f64) as u64);
             }
-            None if fresh_step => {
+            None if is_new_step => {
                 let percent = (fraction * 100.0).round();
                 // A closed stderr must not stop the work.
                 writeln!(std::io::stderr(), "{stage}: {percent}%").ok();

@@ -25,7 +25,7 @@ pub fn draw(mut frames: Vec<Frame>, boxes_px: &[Rect]) -> Vec<u8> {
         let unit = unit_px(last.width, last.height);
         let mut pen = Pen::new(last.width, last.height);
         for rect in boxes_px {
-            stroke(&mut pen, last, &outline(rect), [1.1 * unit, unit], HEADING);
+            stroke(&mut pen, last, &outline(rect), 1.1 * unit, unit, HEADING);
         }
     }
     let mut pictures: Vec<RgbImage> = frames.iter().map(Frame::to_rgb).collect();

@@ -67,7 +67,7 @@ impl FlockOverlay {
 
     fn number(&mut self, frame: &mut Frame, text: &str, at: [f64; 2]) {
         let dot_px = 1.1 * self.unit_px;
-        write_rim(&mut self.pen, frame, text, at, [dot_px, 0.7 * dot_px]);
+        write_rim(&mut self.pen, frame, text, at, dot_px, 0.7 * dot_px);
         self.pen.text(text, at, dot_px);
         self.pen.draw(frame, NUMBER);
     }

@@ -99,13 +99,13 @@ impl<'a> Overlay<'a> {
 
     fn label(&mut self, frame: &mut Frame, label: &str, dot_px: f64) {
         let at = [6.0 * dot_px, 5.0 * dot_px];
-        write_rim(&mut self.pen, frame, label, at, [dot_px, 0.6 * dot_px]);
+        write_rim(&mut self.pen, frame, label, at, dot_px, 0.6 * dot_px);
         self.pen.text(label, at, dot_px);
         self.pen.draw(frame, BOX);
     }
 
     fn stroke(&mut self, frame: &mut Frame, points: &[[f64; 2]], radius_px: f64, rgb: [u8; 3]) {
-        stroke(&mut self.pen, frame, points, [radius_px, self.unit_px], rgb);
+        stroke(&mut self.pen, frame, points, radius_px, self.unit_px, rgb);
     }
 }
 
@@ -115,7 +115,8 @@ pub(super) fn stroke(
     pen: &mut Pen,
     frame: &mut Frame,
     points: &[[f64; 2]],
-    [radius_px, unit_px]: [f64; 2],
+    radius_px: f64,
+    unit_px: f64,
     rgb: [u8; 3],
 ) {
     pen.polyline(points, radius_px + 0.9 * unit_px, 0.55);
@@ -130,7 +131,8 @@ pub(super) fn write_rim(
     frame: &mut Frame,
     text: &str,
     [x, y]: [f64; 2],
-    [dot_px, rim_px]: [f64; 2],
+    dot_px: f64,
+    rim_px: f64,
 ) {
     for (dx, dy) in [(-rim_px, 0.0), (rim_px, 0.0), (0.0, -rim_px), (0.0, rim_px)] {
         pen.text(text, [x + dx, y + dy], dot_px);

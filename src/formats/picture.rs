@@ -80,7 +80,11 @@ pub fn write_jpeg(image: &RgbImage) -> Vec<u8> {
 
 /// Reads an 8-bit RGB PNG.
 pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
-    let (width, height, pixels) = decode(bytes, ColorType::Rgb, [u32::MAX; 2])?;
+    let Decoded {
+        width,
+        height,
+        pixels,
+    } = decode(bytes, ColorType::Rgb, [u32::MAX; 2])?;
     Ok(RgbImage {
         width,
         height,
@@ -90,7 +94,11 @@ pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
 
 /// Reads an 8-bit RGBA PNG of at most `max_size_px` columns and rows.
 pub fn read_rgba(bytes: &[u8], max_size_px: [u32; 2]) -> Result<RgbaImage, Error> {
-    let (width, height, pixels) = decode(bytes, ColorType::Rgba, max_size_px)?;
+    let Decoded {
+        width,
+        height,
+        pixels,
+    } = decode(bytes, ColorType::Rgba, max_size_px)?;
     Ok(RgbaImage {
         width,
         height,
@@ -115,11 +123,13 @@ fn encode(width: u32, height: u32, color: ColorType, depth: BitDepth, pixels: &[
     bytes
 }
 
-fn decode(
-    bytes: &[u8],
-    color: ColorType,
-    max_size_px: [u32; 2],
-) -> Result<(u32, u32, Vec<u8>), Error> {
+struct Decoded {
+    width: u32,
+    height: u32,
+    pixels: Vec<u8>,
+}
+
+fn decode(bytes: &[u8], color: ColorType, max_size_px: [u32; 2]) -> Result<Decoded, Error> {
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;
     let found = reader.output_color_type();
     if found != (color, BitDepth::Eight) {
@@ -138,7 +148,11 @@ fn decode(
     }
     let mut pixels = vec![0; width as usize * height as usize * color.samples()];
     reader.next_frame(&mut pixels)?;
-    Ok((width, height, pixels))
+    Ok(Decoded {
+        width,
+        height,
+        pixels,
+    })
 }
 
 #[cfg(test)]

@@ -13,19 +13,14 @@ use super::error::Error;
 use super::gray_range::{GrayRange, MIN_SAMPLED_FRAMES};
 use super::limits::Limits;
 use super::notice::Notice;
+use super::probe::FULL_RANGE;
 use super::probe::header::square_pixels;
 use super::probe::timeline::{Claims, Timeline};
 use super::read_options::ReadOptions;
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_idx};
-use crate::raster::{ColorSpec, Frame, Matrix, Range, RgbImage};
+use crate::raster::{Frame, RgbImage};
 use picture::Picture;
 use source::{Reader, Source};
-
-/// Full range, so gray keeps its levels.
-const COLOR: ColorSpec = ColorSpec {
-    matrix: Matrix::Bt601,
-    range: Range::Full,
-};
 
 /// Pictures of one size, within the limits.
 #[derive(Clone, Debug)]
@@ -137,8 +132,8 @@ impl Pictures {
             height,
             pixels,
         };
-        if (frame.width, frame.height, frame.color) != (width, height, COLOR) {
-            *frame = Frame::new(width, height, COLOR);
+        if (frame.width, frame.height, frame.color) != (width, height, FULL_RANGE) {
+            *frame = Frame::new(width, height, FULL_RANGE);
         }
         frame.draw_all_rgb(&canvas);
         Ok(())
@@ -153,7 +148,7 @@ impl FrameSource for Pictures {
             height,
             fps: self.fps,
             n_frames_hint: self.source.n_pictures(),
-            color: COLOR,
+            color: FULL_RANGE,
         }
     }
 

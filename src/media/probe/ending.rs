@@ -58,6 +58,15 @@ struct Bytes<'a> {
     n_bytes: u64,
 }
 
+/// Header of a Matroska element.
+struct EbmlHeader {
+    id: u64,
+    /// Size of the contents, bytes; `None` if unknown.
+    size: Option<u64>,
+    /// Length of the header, bytes.
+    n_bytes: u64,
+}
+
 impl Bytes<'_> {
     /// Returns the `N` bytes at an offset; `None` if the file ends before.
     fn at<const N: usize>(&self, place: u64) -> io::Result<Option<[u8; N]>> {
@@ -112,14 +121,15 @@ impl Bytes<'_> {
             if place == self.n_bytes || is_past {
                 break;
             }
-            let Some((id, size, head)) = self.ebml_header(place)? else {
+            let Some(header) = self.ebml_header(place)? else {
                 return Ok(Ending::InsideData);
             };
-            let end = size.map(|size| place.saturating_add(head).saturating_add(size));
-            match (id, end) {
+            let contents = place.saturating_add(header.n_bytes);
+            let end = header.size.map(|size| contents.saturating_add(size));
+            match (header.id, end) {
                 (SEGMENT, end) if segment_end.is_none() => {
                     segment_end = Some(end);
-                    place += head;
+                    place = contents;
                 }
                 // The end of a cluster without a size is found by reading its packets.
                 (_, None) => return Ok(Ending::Whole),
@@ -134,8 +144,7 @@ impl Bytes<'_> {
         })
     }
 
-    /// Returns the id of an element, its size (`None` if unknown), and the length of both.
-    fn ebml_header(&self, place: u64) -> io::Result<Option<(u64, Option<u64>, u64)>> {
+    fn ebml_header(&self, place: u64) -> io::Result<Option<EbmlHeader>> {
         let Some((id, n_id)) = self.ebml_number(place, false)? else {
             return Ok(None);
         };
@@ -143,7 +152,11 @@ impl Bytes<'_> {
             return Ok(None);
         };
         let is_unknown = size == (1 << (7 * n_size)) - 1;
-        Ok(Some((id, (!is_unknown).then_some(size), n_id + n_size)))
+        Ok(Some(EbmlHeader {
+            id,
+            size: (!is_unknown).then_some(size),
+            n_bytes: n_id + n_size,
+        }))
     }
 
     /// Returns a number of variable length and its length in bytes. The leading zeros give the length. The

@@ -141,17 +141,18 @@ pub(super) fn check_codec(stream: &Value) -> Result<(), Error> {
     }
 }
 
-/// Returns the displayed size and the transformation to it.
-pub(super) fn shown_size(stream: &Value, options: &ReadOptions) -> (u64, u64, Orientation) {
+/// Returns the displayed width and height, pixels.
+pub(super) fn shown_size(stream: &Value, options: &ReadOptions) -> [u64; 2] {
     let side = |name: &str| number(&stream[name]).unwrap_or(0.0);
     let stored_aspect = ratio(text(&stream["sample_aspect_ratio"]), ':');
     let aspect = options.pixel_aspect.or(stored_aspect);
-    let [mut width, mut height] = square_pixels([side("width"), side("height")], aspect);
-    let orientation = orientation_of(stream);
-    if orientation.transpose {
-        std::mem::swap(&mut width, &mut height);
-    }
-    (width as u64, height as u64, orientation)
+    let [width, height] = square_pixels([side("width"), side("height")], aspect);
+    let size = if orientation_of(stream).transpose {
+        [height, width]
+    } else {
+        [width, height]
+    };
+    size.map(|side| side as u64)
 }
 
 /// Returns the size in square pixels. The smaller dimension is stretched, so that no measured detail is lost.
@@ -164,7 +165,7 @@ pub(in crate::media) fn square_pixels([width, height]: [f64; 2], aspect: Option<
 }
 
 /// Returns the rotation of a display matrix, rounded to a quarter turn.
-fn orientation_of(stream: &Value) -> Orientation {
+pub(super) fn orientation_of(stream: &Value) -> Orientation {
     let matrix = array(&stream["side_data_list"])
         .iter()
         .map(|data| text(&data["displaymatrix"]))

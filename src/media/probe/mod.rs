@@ -27,7 +27,7 @@ use crate::raster::{ColorSpec, Matrix, Range};
 use ending::Ending;
 use header::{
     Orientation, alpha_decoder, check_codec, color_of, has_alpha, index_of, is_interlaced, number,
-    ratio, read_header, shown_size, text, video_streams,
+    orientation_of, ratio, read_header, shown_size, text, video_streams,
 };
 use packets::{AllPackets, Packets, Pictures};
 use timeline::{Claims, Timeline};
@@ -36,8 +36,8 @@ use timeline::{Claims, Timeline};
 /// its headers are checked first. Free choice.
 const MAX_PARALLEL_BYTES: u64 = 64 << 20;
 
-/// Gray of the full range, whose levels are kept.
-pub(in crate::media) const GRAY: ColorSpec = ColorSpec {
+/// Colors of the full range, so that gray keeps its levels.
+pub(in crate::media) const FULL_RANGE: ColorSpec = ColorSpec {
     matrix: Matrix::Bt601,
     range: Range::Full,
 };
@@ -117,7 +117,7 @@ pub(in crate::media) fn probe(
     }
     let packets = packets.unwrap_or_else(read_packets)?;
     let stream = choose_stream(&streams, &packets)?;
-    let (width, height, orientation) = check_stream(stream, limits, options)?;
+    let [width, height] = check_stream(stream, limits, options)?;
     let times = PictureTimes::find(path, &file, stream, &packets, limits)?;
     let (timeline, mut notices) = times.timeline(stream, limits, options)?;
     let n_pictures = times.times_s.len();
@@ -129,11 +129,11 @@ pub(in crate::media) fn probe(
         stream_idx: index_of(stream),
         width: width as u32,
         height: height as u32,
-        orientation,
+        orientation: orientation_of(stream),
         pix_fmt: text(&stream["pix_fmt"]).to_owned(),
         color_space: text(&stream["color_space"]).to_owned(),
         color: if options.alpha_as_gray {
-            GRAY
+            FULL_RANGE
         } else {
             color_of(stream)
         },
@@ -283,14 +283,10 @@ fn choose_stream<'a>(streams: &[&'a Value], packets: &AllPackets) -> Result<&'a 
     (films.rev().max_by_key(|s| rank(s))).ok_or(Error::NoVideoStream)
 }
 
-/// Refuses a stream whose codec or size is not accepted. Returns the displayed size and the rotation.
-fn check_stream(
-    stream: &Value,
-    limits: &Limits,
-    options: &ReadOptions,
-) -> Result<(u64, u64, Orientation), Error> {
+/// Refuses a stream whose codec or size is not accepted. Returns the displayed width and height.
+fn check_stream(stream: &Value, limits: &Limits, options: &ReadOptions) -> Result<[u64; 2], Error> {
     check_codec(stream)?;
-    let (width, height, orientation) = shown_size(stream, options);
+    let [width, height] = shown_size(stream, options);
     limits.check_size(width, height)?;
-    Ok((width, height, orientation))
+    Ok([width, height])
 }

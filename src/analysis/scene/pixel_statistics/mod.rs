@@ -18,6 +18,14 @@ enum Plane {
     Chroma,
 }
 
+/// Kind and size of a plane.
+#[derive(Clone, Copy)]
+struct PlaneSize {
+    plane: Plane,
+    width: usize,
+    n_rows: usize,
+}
+
 impl Samples {
     /// Returns the median of the samples of `group`, value by value in each plane.
     pub(super) fn median_frame(&self, group: u64) -> Frame {
@@ -146,22 +154,31 @@ impl Samples {
     /// Calls `visit` for every value of a frame with its index, plane, column and row.
     fn for_each_value(&self, mut visit: impl FnMut(usize, Plane, usize, usize)) {
         let mut at = 0;
-        for (plane, width, n_rows) in self.planes() {
-            for y in 0..n_rows {
-                for x in 0..width {
-                    visit(at, plane, x, y);
+        for size in self.planes() {
+            for y in 0..size.n_rows {
+                for x in 0..size.width {
+                    visit(at, size.plane, x, y);
                     at += 1;
                 }
             }
         }
     }
 
-    /// Returns kind, width and number of rows of each plane, in the order of the frame's bytes.
-    fn planes(&self) -> [(Plane, usize, usize); 3] {
+    /// Returns the planes in the order of the frame's bytes.
+    fn planes(&self) -> [PlaneSize; 3] {
         let frame = &self.frames[0];
         let (w, h) = (frame.width as usize, frame.height as usize);
-        let chroma = (Plane::Chroma, frame.chroma_width() as usize, h.div_ceil(2));
-        [(Plane::Luma, w, h), chroma, chroma]
+        let luma = PlaneSize {
+            plane: Plane::Luma,
+            width: w,
+            n_rows: h,
+        };
+        let chroma = PlaneSize {
+            plane: Plane::Chroma,
+            width: frame.chroma_width() as usize,
+            n_rows: h.div_ceil(2),
+        };
+        [luma, chroma, chroma]
     }
 
     /// Returns a frame of order statistics: each value has the wanted rank among the values of the samples of
@@ -178,7 +195,12 @@ impl Samples {
         let mut result = self.frames[0].clone();
         let mut rest = result.planes.as_mut_slice();
         let mut first = 0;
-        for (plane, width, n_rows) in self.planes() {
+        for PlaneSize {
+            plane,
+            width,
+            n_rows,
+        } in self.planes()
+        {
             let (values, others) = rest.split_at_mut(width * n_rows);
             values
                 .par_chunks_mut(width)
