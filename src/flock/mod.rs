@@ -46,6 +46,7 @@ use self::placement::{Placed, Stage};
 use self::plan::{Model, Plan, Planner};
 use crate::geometry::rounded;
 use crate::library::Library;
+use crate::parameters::Parameters;
 use crate::progress::{Progress, Quiet};
 
 /// A simulated, planned and placed flock, without its pixels.

@@ -1,20 +1,12 @@
 //! Parameters from JSON: `{"preset": "papers", "kappa": 3}` overrides values of a preset; without a preset it
 //! overrides the defaults. All kinds of parameters use this module.
 
-use serde::de::{DeserializeOwned, Error as _};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
-use crate::{analysis, fish, flock};
-
-/// Parameters with presets and ranges.
-pub trait Preset: Serialize + DeserializeOwned + Default {
-    /// Returns the parameters of a preset by name, if it exists.
-    fn preset(name: &str) -> Option<Self>;
-
-    /// Checks all ranges. The error names the parameter and its range.
-    fn check(&self) -> Result<(), String>;
-}
+use crate::analysis;
+use crate::parameters::Parameters;
 
 /// Reasons why a JSON object is not a valid set of parameters.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -29,7 +21,7 @@ pub enum Error {
 
 /// Returns the parameters of an object with an optional `preset` and overrides. The error names the
 /// parameter.
-pub fn read<P: Preset>(mut overrides: Map<String, Value>) -> Result<P, Error> {
+pub fn read<P: Parameters>(mut overrides: Map<String, Value>) -> Result<P, Error> {
     let start = match overrides.remove("preset") {
         None | Some(Value::Null) => P::default(),
         Some(name) => {
@@ -56,36 +48,6 @@ fn override_with(value: &mut Value, overrides: Value) {
     }
 }
 
-impl Preset for analysis::Params {
-    fn preset(name: &str) -> Option<Self> {
-        (name == "papers").then(analysis::Params::papers)
-    }
-
-    fn check(&self) -> Result<(), String> {
-        analysis::Params::check(self)
-    }
-}
-
-impl Preset for flock::Params {
-    fn preset(name: &str) -> Option<Self> {
-        flock::Params::preset(name)
-    }
-
-    fn check(&self) -> Result<(), String> {
-        flock::Params::check(self)
-    }
-}
-
-impl Preset for fish::Params {
-    fn preset(name: &str) -> Option<Self> {
-        (name == "papers").then(fish::Params::papers)
-    }
-
-    fn check(&self) -> Result<(), String> {
-        fish::Params::check(self)
-    }
-}
-
 /// Parameters of an analysis that no longer exist. Files of older versions hold them.
 const REMOVED: [&str; 1] = ["approximate"];
 
@@ -108,6 +70,7 @@ fn invalid(error: serde_json::Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flock;
 
     fn analysis(json: &str) -> Result<analysis::Params, Error> {
         read(serde_json::from_str(json).unwrap())
@@ -132,7 +95,7 @@ mod tests {
 
     #[test]
     fn every_preset_of_a_flock_can_be_asked_for() {
-        for name in flock::Params::PRESETS {
+        for &name in flock::Params::PRESETS {
             let overrides = Map::from_iter([("preset".to_owned(), Value::from(name))]);
             assert_eq!(read(overrides).ok(), flock::Params::preset(name), "{name}");
         }

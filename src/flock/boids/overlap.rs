@@ -175,6 +175,7 @@ mod tests {
     use crate::flock::boids::tank::Tank;
     use crate::flock::boids::vector::norm;
     use crate::flock::lens::Lens;
+    use crate::parameters::Parameters;
 
     #[test]
     fn two_that_only_meet_in_the_step_are_pushed_apart() {

@@ -6,6 +6,7 @@ use super::params::Zones;
 use super::vector::{add_scaled, cross, minus, norm, unit};
 use super::*;
 use crate::flock::lens::Lens;
+use crate::parameters::Parameters;
 
 fn preset(name: &str) -> Params {
     Params::preset(name).expect("a known preset")

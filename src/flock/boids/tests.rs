@@ -8,6 +8,7 @@ use crate::flock::motion::motion_of;
 use crate::flock::params::{Goal, Obstacle, Predator};
 use crate::flock::synthetic;
 use crate::library::{Library, View};
+use crate::parameters::Parameters;
 
 /// Returns the positions and velocities of `n_frames` frames.
 fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Vec<Vec3>>) {
@@ -77,7 +78,7 @@ fn violations(name: &str, count: u32, greatest: Vec3) -> (u32, u32) {
 fn nobody_lies_upon_another_and_where_there_is_room_they_keep_half_a_length() {
     let tanks = [[15.0, 11.0, 0.0], [15.0, 11.0, 3.0], [4.0, 3.0, 0.0]];
     for (name, tank) in Params::PRESETS
-        .into_iter()
+        .iter()
         .flat_map(|name| tanks.map(|tank| (name, tank)))
     {
         assert_eq!(violations(name, 40, tank), (0, 0), "{name} {tank:?}");
@@ -94,7 +95,7 @@ fn nobody_turns_faster_than_the_animal_not_even_at_a_wall_or_in_a_crowd() {
         ..Calibration::default()
     };
     for (name, tank) in Params::PRESETS
-        .into_iter()
+        .iter()
         .flat_map(|name| [[4.0, 3.0, 0.0], [9.0, 5.0, 3.0]].map(|tank| (name, tank)))
     {
         let params = Params {

@@ -23,6 +23,7 @@ use self::cost::Ledger;
 use self::graph::Graph;
 use super::{Flock, Individual};
 use crate::library::Library;
+use crate::parameters::Parameters;
 use crate::progress::Progress;
 
 /// Individuals checked between two reports of progress. Free choice.

@@ -6,6 +6,7 @@ use super::*;
 use crate::flock::synthetic;
 use crate::flock::{Params, plan_flock};
 use crate::library::View;
+use crate::parameters::Parameters;
 use crate::progress::Silent;
 
 /// Prepares nothing: no frame has a background of its own.

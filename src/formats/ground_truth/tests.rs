@@ -6,6 +6,7 @@ use super::*;
 use crate::flock::{Compositor, Params, Shot, plan_flock, synthetic};
 use crate::formats::picture;
 use crate::library::View;
+use crate::parameters::Parameters;
 use crate::progress::Silent;
 
 const N_FRAMES: usize = 30;
