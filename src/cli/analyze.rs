@@ -176,43 +176,34 @@ fn write_views(folder: &Path, library: &Library) -> Result<(), Error> {
 
 /// Returns the preset with the parameters set by flags.
 fn params_of(args: &Args) -> Result<Params, Error> {
-    let mut wanted = Map::new();
-    let mut put = |name: &str, value: Option<Value>| {
-        if let Some(value) = value {
-            wanted.insert(name.to_owned(), value);
-        }
-    };
-    put("preset", args.preset.as_ref().map(|name| json!(name)));
-    put("view", args.view.as_ref().map(|view| json!(view)));
-    put("follow", args.follow_largest.then(|| json!("largest")));
-    put("fps", args.fps.map(|fps| json!(fps)));
-    let pixel_aspect = args.pixel_aspect;
-    put("pixel_aspect", pixel_aspect.map(|aspect| json!(aspect)));
-    put("from_s", args.from.map(|from_s| json!(from_s)));
-    put("to_s", args.to.map(|to_s| json!(to_s)));
-    let animal_at = args.animal_at.as_deref();
-    put("animal_at", animal_at.map(read_animal_at).transpose()?);
-    if !args.ignore.is_empty() {
-        let boxes = args.ignore.iter().map(|text| read_ignore(text));
-        let boxes = boxes.collect::<Result<Vec<Value>, Error>>()?;
-        put("ignore", Some(json!(boxes)));
-    }
-    put("clip_frames", args.clip_frames.map(|frames| json!(frames)));
-    let weights = args.clip_weights.as_ref();
-    put("clip_weights", weights.map(|weights| json!(weights)));
-    put(
-        "scale_mode",
-        args.scale_mode.as_ref().map(|mode| json!(mode)),
-    );
-    put("epsilon", args.epsilon.map(|epsilon| json!(epsilon)));
+    let animal_at = args.animal_at.as_deref().map(read_animal_at);
+    let ignored = args.ignore.iter().map(|text| read_ignore(text));
+    let ignored = ignored.collect::<Result<Vec<Value>, Error>>()?;
     let animal = args.animal_length.zip(args.animal_height);
-    put(
-        "animal",
-        animal.map(|(length, height)| json!({"length_m": length, "height_m": height})),
-    );
-    put("camera", args.camera.as_deref().map(read_json).transpose()?);
-    set::apply(&args.set, &mut wanted)?;
-    params::read(wanted).map_err(|error| Error::Usage(error.to_string()))
+    let animal = animal.map(|(length, height)| json!({"length_m": length, "height_m": height}));
+    let given = [
+        ("preset", args.preset.clone().map(Value::from)),
+        ("view", args.view.clone().map(Value::from)),
+        ("follow", args.follow_largest.then(|| json!("largest"))),
+        ("fps", args.fps.map(Value::from)),
+        ("pixel_aspect", args.pixel_aspect.map(Value::from)),
+        ("from_s", args.from.map(Value::from)),
+        ("to_s", args.to.map(Value::from)),
+        ("animal_at", animal_at.transpose()?),
+        ("ignore", (!ignored.is_empty()).then(|| json!(ignored))),
+        ("clip_frames", args.clip_frames.map(Value::from)),
+        ("clip_weights", args.clip_weights.clone().map(Value::from)),
+        ("scale_mode", args.scale_mode.clone().map(Value::from)),
+        ("epsilon", args.epsilon.map(Value::from)),
+        ("animal", animal),
+        ("camera", args.camera.as_deref().map(read_json).transpose()?),
+    ];
+    let mut overrides: Map<String, Value> = given
+        .into_iter()
+        .filter_map(|(name, value)| Some((name.to_owned(), value?)))
+        .collect();
+    set::apply(&args.set, &mut overrides)?;
+    params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
 }
 
 /// Parses FRAME:X,Y.

@@ -103,14 +103,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_presets_lie_in_their_ranges_and_a_negative_length_does_not() {
+    fn presets_pass_the_check_and_a_negative_length_does_not() {
         assert_eq!(Params::default().check(), Ok(()));
         assert_eq!(Params::papers().check(), Ok(()));
         let wrong = Params {
             length_m: Some(-0.1),
             ..Params::default()
         };
-        assert!(wrong.check().is_err_and(|why| why.contains("length_m")));
+        let sentence = "length_m must be above 0: -0.1";
+        assert_eq!(wrong.check(), Err(sentence.into()));
         let wrong = Params {
             bank_rad: f64::NAN,
             ..Params::default()

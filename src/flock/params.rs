@@ -310,7 +310,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_preset_passes_its_own_check() {
+    fn every_preset_passes_the_check() {
         for name in Params::PRESETS {
             let params = Params::preset(name).expect("a listed preset exists");
             assert_eq!(params.check(), Ok(()), "{name}");
@@ -318,38 +318,48 @@ mod tests {
         assert_eq!(Params::preset("herd"), None);
     }
 
-    #[test]
-    fn what_is_out_of_range_is_named() {
-        let no_one = Params {
-            count: Some(0),
-            ..Params::default()
-        };
-        assert_eq!(no_one.check(), Err("count must lie in 1..=10000: 0".into()));
-        let of = |count, frames| Params {
+    fn shown(count: u32, frames: u32) -> Params {
+        Params {
             count: Some(count),
             frames,
             ..Params::default()
-        };
-        assert_eq!(of(2000, 2000).check(), Ok(()));
-        assert_eq!(of(400, 10_000).check(), Ok(()));
-        assert_eq!(of(20, 200_000).check(), Ok(()));
-        let whole = Params {
+        }
+    }
+
+    #[test]
+    fn number_of_frames_is_limited_by_count_and_position() {
+        for (count, frames) in [(2000, 2000), (400, 10_000), (20, 200_000)] {
+            assert_eq!(shown(count, frames).check(), Ok(()), "{count} {frames}");
+        }
+        let sentence = "count times frames must be at most 4000000: 20000000";
+        assert_eq!(shown(2000, 10_000).check(), Err(sentence.into()));
+        let leash = Params {
             position: Position::Leash,
-            ..of(20, 200_000)
+            ..shown(20, 200_000)
         };
         let sentence = "frames without position film must lie in 1..=10000: 200000";
-        assert_eq!(whole.check(), Err(sentence.into()));
-        let crowd = of(2000, 10_000).check();
-        let sentence = "count times frames must be at most 4000000: 20000000";
-        assert_eq!(crowd, Err(sentence.into()));
+        assert_eq!(leash.check(), Err(sentence.into()));
+    }
+
+    #[test]
+    fn errors_name_the_parameter_its_limits_and_its_value() {
+        let sentence = "count must lie in 1..=10000: 0";
+        assert_eq!(shown(0, 400).check(), Err(sentence.into()));
         let mut params = Params::default();
         params.rules.picture_separation_bl = -1.0;
-        assert!(params.check().is_err(), "a negative radius");
+        let sentence = "rules.picture_separation_bl must lie in 0..=50: -1";
+        assert_eq!(params.check(), Err(sentence.into()));
+    }
+
+    #[test]
+    fn numbers_that_are_not_finite_are_refused() {
         let mut params = Params::default();
         params.matching.wx = f64::NAN;
         assert_eq!(params.check(), Err("all numbers must be finite".into()));
-        let mut params = Params::default();
-        params.spacing_bl = Some(f64::INFINITY);
-        assert_eq!(params.check(), Err("all numbers must be finite".into()));
+        let infinite = Params {
+            spacing_bl: Some(f64::INFINITY),
+            ..Params::default()
+        };
+        assert_eq!(infinite.check(), Err("all numbers must be finite".into()));
     }
 }

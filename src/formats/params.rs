@@ -77,12 +77,12 @@ mod tests {
     }
 
     #[test]
-    fn nothing_asked_for_gives_the_defaults() {
+    fn empty_object_gives_the_defaults() {
         assert_eq!(analysis("{}"), Ok(analysis::Params::default()));
     }
 
     #[test]
-    fn a_preset_is_the_start_and_the_rest_overrides_it() {
+    fn parameters_override_the_values_of_the_preset() {
         let papers = analysis::Params::papers();
         assert_eq!(
             analysis(r#"{"preset": "papers", "mirror": true}"#),
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn every_preset_of_a_flock_can_be_asked_for() {
+    fn every_preset_of_a_flock_is_read_by_name() {
         for &name in flock::Params::PRESETS {
             let overrides = Map::from_iter([("preset".to_owned(), Value::from(name))]);
             assert_eq!(read(overrides).ok(), flock::Params::preset(name), "{name}");
@@ -105,12 +105,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_or_out_of_range_is_named() {
-        let said = |json| analysis(json).unwrap_err().to_string();
-        assert_eq!(said(r#"{"preset": "p"}"#), "the preset is unknown: \"p\"");
-        assert!(said(r#"{"colour": 1}"#).contains("colour"));
+    fn unknown_names_and_values_out_of_range_are_named() {
+        let error = |json| analysis(json).unwrap_err().to_string();
+        assert_eq!(error(r#"{"preset": "p"}"#), "the preset is unknown: \"p\"");
+        assert!(error(r#"{"colour": 1}"#).contains("colour"));
         assert_eq!(
-            said(r#"{"threshold": 0}"#),
+            error(r#"{"threshold": 0}"#),
             "threshold must lie in 1..=254: 0"
         );
     }

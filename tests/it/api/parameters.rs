@@ -20,8 +20,37 @@ const NOUNS: [Noun; 3] = [
     ("FishParams", |json| read::<fish::Params>(json).map(drop)),
 ];
 
+/// Keywords that the schema of a parameter may have. `Parameters::check` or the type of the field enforces each.
+const KEYWORDS: [&str; 18] = [
+    "$ref",
+    "additionalProperties",
+    "default",
+    "description",
+    "enum",
+    "exclusiveMinimum",
+    "format",
+    "items",
+    "maxItems",
+    "maximum",
+    "minItems",
+    "minimum",
+    "multipleOf",
+    "oneOf",
+    "pattern",
+    "properties",
+    "required",
+    "type",
+];
+
 /// The schemas of the OpenAPI document.
 struct Schemas(Value);
+
+/// A field of an object in the document.
+struct Field<'a> {
+    name: String,
+    schema: &'a Value,
+    is_required: bool,
+}
 
 /// A value, and the name of the parameter that is tried in it.
 type Trial = (String, Value);
@@ -55,6 +84,29 @@ impl Schemas {
         }
     }
 
+    /// Returns the fields of all objects that a schema allows, and of the objects in them.
+    fn fields<'a>(&'a self, name: &str, schema: &'a Value) -> Vec<Field<'a>> {
+        let mut fields = Vec::new();
+        for object in self.choices(schema) {
+            let required = object["required"].as_array();
+            for (field, schema) in object["properties"].as_object().into_iter().flatten() {
+                let name = format!("{name}.{field}");
+                fields.extend(self.fields(&name, schema));
+                fields.push(Field {
+                    name,
+                    schema,
+                    is_required: required.is_some_and(|all| all.contains(&json!(field))),
+                });
+            }
+            fields.extend(
+                object
+                    .get("items")
+                    .map_or(Vec::new(), |items| self.fields(name, items)),
+            );
+        }
+        fields
+    }
+
     /// Returns a valid value.
     fn sample(&self, schema: &Value) -> Value {
         let schema = self.choices(schema)[0];
@@ -66,10 +118,11 @@ impl Schemas {
         } else if has_type(schema, "array") {
             self.list(schema, schema["minItems"].as_u64().unwrap_or(1))
         } else {
-            let least = schema["minimum"].as_f64().unwrap_or(1.0).max(1.0);
-            match has_type(schema, "integer") {
-                true => json!(least as u64),
-                false => json!(least),
+            let number = schema["minimum"].as_f64().unwrap_or(1.0).max(1.0);
+            if has_type(schema, "integer") {
+                json!(number as u64)
+            } else {
+                json!(number)
             }
         }
     }
@@ -135,48 +188,48 @@ fn has_type(schema: &Value, wanted: &str) -> bool {
             .is_some_and(|all| all.contains(&json!(wanted)))
 }
 
+/// Returns what the schema of a value lacks or has too much.
+fn fault(schema: &Value) -> Option<String> {
+    let has = |keyword: &str| schema.get(keyword).is_some();
+    let is_number = has_type(schema, "number") || has_type(schema, "integer");
+    let mut keywords = schema.as_object().unwrap().keys();
+    if let Some(unknown) = keywords.find(|key| !KEYWORDS.contains(&key.as_str())) {
+        Some(format!("the keyword {unknown}, which nothing enforces"))
+    } else if is_number && !has("minimum") && !has("exclusiveMinimum") {
+        Some("no limits".to_owned())
+    } else if has_type(schema, "string") && !has("enum") && !has("pattern") {
+        Some("no list of names and no pattern".to_owned())
+    } else {
+        None
+    }
+}
+
 #[tokio::test]
 async fn every_parameter_has_its_default_and_limits_in_the_document() {
     let schemas = Schemas::new().await;
+    let fields = NOUNS.map(|(noun, _)| schemas.fields(noun, &schemas.0[noun]));
+    let fields: Vec<Field> = fields.into_iter().flatten().collect();
+    assert!(fields.len() > 80, "only {} parameters", fields.len());
     let mut faults = BTreeSet::new();
-    let mut n_parameters = 0;
-    let mut objects: Vec<(String, &Value)> = (NOUNS.iter())
-        .map(|(noun, _)| ((*noun).to_owned(), &schemas.0[*noun]))
-        .collect();
-    while let Some((name, object)) = objects.pop() {
-        let required = object["required"].as_array().into_iter().flatten();
-        let required: Vec<&Value> = required.collect();
-        for (field, schema) in object["properties"].as_object().into_iter().flatten() {
-            n_parameters += 1;
-            let name = format!("{name}.{field}");
-            if schema.get("default").is_none() && !required.contains(&&json!(field)) {
-                faults.insert(format!("{name} has no default"));
-            }
-            for schema in schemas.choices(schema) {
-                let is_point = has_type(schema, "array");
-                let schema = match is_point {
-                    true => schemas.resolve(&schema["items"]),
-                    false => schema,
-                };
-                let has = |keyword: &str| schema.get(keyword).is_some();
-                let is_number = has_type(schema, "number") || has_type(schema, "integer");
-                let is_limited = has("minimum") || has("exclusiveMinimum");
-                if is_number && !is_limited && !is_point {
-                    faults.insert(format!("{name} has no limits"));
-                }
-                if has_type(schema, "string") && !has("enum") && !has("pattern") {
-                    faults.insert(format!("{name} has no names"));
-                }
-                objects.extend(
-                    schemas
-                        .choices(schema)
-                        .into_iter()
-                        .map(|one| (name.clone(), one)),
-                );
-            }
+    for Field {
+        name,
+        schema,
+        is_required,
+    } in fields
+    {
+        if schema.get("default").is_none() && !is_required {
+            faults.insert(format!("{name} has no default"));
+        }
+        for schema in schemas.choices(schema) {
+            // The coordinates of a point may be any numbers.
+            let items = schema
+                .get("items")
+                .filter(|items| items["type"] != "number");
+            let items = items.into_iter().flat_map(|items| schemas.choices(items));
+            let found = items.chain([schema]).filter_map(fault);
+            faults.extend(found.map(|fault| format!("{name} has {fault}")));
         }
     }
-    assert!(n_parameters > 80, "only {n_parameters} parameters");
     assert!(faults.is_empty(), "{faults:#?}");
 }
 
