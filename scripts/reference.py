@@ -138,14 +138,14 @@ def resolved(schemas, schema):
 
 def values(schema, items):
     """Returns the limits or names that a schema allows, in words."""
-    kinds = [kind for kind in [schema.get("type", [])] for kind in (kind if isinstance(kind, list) else [kind])]
     if names := schema.get("enum"):
         return codes(names)
+    if items and "minItems" in schema:
+        each = f", each {values(items, {})}" if "minimum" in items else ""
+        return f"{schema['minItems']} numbers{each}"
     if items:
-        counts = [schema[limit] for limit in ("minItems", "maxItems") if limit in schema]
-        number = f"{counts[0]} " if len(set(counts)) == 1 and len(counts) == 2 else ""
-        most = f", at most {counts[0]}" if len(counts) == 1 else ""
-        return f"list of {number}{values(items, {})}{most}"
+        most = f", at most {schema['maxItems']}" if "maxItems" in schema else ""
+        return f"list of {values(items, {})}{most}".replace("object", "objects")
     if pattern := schema.get("pattern"):
         return f"`{pattern}`"
     if "maximum" in schema:
@@ -155,7 +155,7 @@ def values(schema, items):
         return f"above {schema['exclusiveMinimum']}"
     if "minimum" in schema:
         return f"at least {schema['minimum']}"
-    return " or ".join(kind for kind in kinds if kind != "null") or "object"
+    return "true, false" if schema.get("type") == "boolean" else "object"
 
 
 def codes(names):

@@ -249,7 +249,7 @@ async fn values_at_the_limits_of_the_document_are_accepted() {
     };
     for noun in NOUNS {
         let outcomes = schemas.outcomes(noun, &at_limits);
-        assert!(outcomes.len() > 8, "{} {}", noun.0, outcomes.len());
+        assert!(outcomes.len() > 5, "{} {}", noun.0, outcomes.len());
         for ((name, json), error) in outcomes {
             assert_eq!(error, None, "{name}: {json}");
         }
@@ -280,7 +280,7 @@ async fn values_beyond_the_limits_of_the_document_are_refused() {
     };
     for noun in NOUNS {
         let outcomes = schemas.outcomes(noun, &beyond);
-        assert!(outcomes.len() > 8, "{} {}", noun.0, outcomes.len());
+        assert!(outcomes.len() > 5, "{} {}", noun.0, outcomes.len());
         for ((name, json), error) in outcomes {
             let field = name.rsplit('.').next().unwrap();
             let error = error.unwrap_or_else(|| panic!("{name} was accepted: {json}"));
