@@ -4,11 +4,12 @@
     scripts/reference.py target/release/flockreel            writes the three pages
     scripts/reference.py target/release/flockreel --check    writes nothing; exit status 1 if a page differs
 
-Commands, flags and settings come from `--help`. Error codes come from `/docs/errors` of a service that the script
-starts on a free port with an empty data folder.
+Commands, flags and settings come from `--help`. Parameters come from `/openapi.json`, and error codes from
+`/docs/errors`, of a service that the script starts on a free port with an empty data folder.
 """
 import argparse
 import html
+import json
 import os
 import re
 import subprocess
@@ -23,6 +24,9 @@ PAGES = Path(__file__).resolve().parent.parent / "docs" / "reference"
 NOTE = "`scripts/reference.py` writes this page from the texts of the program. Change those texts, not this page.\n"
 # Without the settings of the caller, which `--help` would print.
 ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("FLOCKREEL_")}
+# Nouns with parameters: command, schema of the parameters, and schema of a request, which has the presets.
+NOUNS = [("an analysis", "analyze", "AnalysisParams", "AnalysisOverrides"),
+         ("a flock", "flock", "FlockParams", "FlockOverrides"), ("a virtual fish", "fish", "FishParams", "FishRequest")]
 DEFAULTS = {"FLOCKREEL_WORKERS": "half of the cores, at least 1"}  # those that depend on the machine
 
 
@@ -91,7 +95,7 @@ def flags(command):
     return table(["argument or flag", "default", "meaning"], *rows) if rows else ""
 
 
-def settings(root):
+def settings(root, document):
     users = {}
     for command, item in ((command, item) for command in tree(root) for item in command.items if item.env):
         users.setdefault(item.env, (item, []))[1].append(f"`{command.words}`" if command.words else "all")
@@ -99,7 +103,63 @@ def settings(root):
     text = f"# Settings\n\n{NOTE}\nA flag overrides the environment variable, the variable the file of `--config`, "
     text += "and the file the default.\nThe file is TOML. Its keys are the flags without leading dashes:\n\n"
     text += '```toml\nbind = "127.0.0.1:9000"\nmax-upload-bytes = 1000000\nno-sample = true\n```\n'
-    return text + table(["flag", "environment variable", "default", "commands", "meaning"], *rows)
+    text += table(["flag", "environment variable", "default", "commands", "meaning"], *rows)
+    return text + "".join(parameters(document["components"]["schemas"], *noun) for noun in NOUNS)
+
+
+def parameters(schemas, noun, command, name, request):
+    """Returns the section about the parameters of a noun, whose schema has this name."""
+    presets = [preset for preset in schemas[request]["properties"]["preset"]["enum"] if preset]
+    text = f"\n## Parameters of {noun}\n\nThe API takes them by name, and `flockreel {command} --set NAME=JSON` as well. "
+    text += f"A dot leads into an object, and `[]` stands for the entries of a list.\nPresets: {codes(presets)}.\n"
+    return text + table(["parameter", "default", "values", "meaning"], *parameter_rows(schemas, schemas[name]))
+
+
+def parameter_rows(schemas, schema, prefix=""):
+    """Returns a row for each field of an object that is no object itself, and the rows of those that are."""
+    rows = []
+    for name, field in schema.get("properties", {}).items():
+        inner = next((one for one in field.get("oneOf", []) if one != {"type": "null"}), field)
+        whole = resolved(schemas, inner)
+        items = resolved(schemas, whole.get("items", {}))
+        below = [one for one in (whole, *whole.get("oneOf", []), items, *items.get("oneOf", [])) if "properties" in one]
+        default = "required" if name in schema.get("required", []) else f"`{json.dumps(field['default'])}`"
+        prose = " ".join(inner.get("description", whole.get("description", "")).split())
+        if whole.get("type") != "object" or "oneOf" in field:
+            rows.append([f"`{prefix}{name}`", default, values(whole, items), prose])
+        for one in below:
+            rows += parameter_rows(schemas, one, f"{prefix}{name}[]." if items else f"{prefix}{name}.")
+    return rows
+
+
+def resolved(schemas, schema):
+    return schemas[schema["$ref"].rsplit("/", 1)[1]] if "$ref" in schema else schema
+
+
+def values(schema, items):
+    """Returns the limits or names that a schema allows, in words."""
+    if names := schema.get("enum"):
+        return codes(names)
+    if items and "minItems" in schema:
+        each = f", each {values(items, {})}" if "minimum" in items else ""
+        return f"{schema['minItems']} numbers{each}"
+    if items:
+        most = f", at most {schema['maxItems']}" if "maxItems" in schema else ""
+        return f"list of {values(items, {})}{most}".replace("object", "objects")
+    if pattern := schema.get("pattern"):
+        return f"`{pattern}`"
+    if "maximum" in schema:
+        step = f", multiple of {schema['multipleOf']}" if "multipleOf" in schema else ""
+        return f"{schema['minimum']} to {schema['maximum']}{step}"
+    if "exclusiveMinimum" in schema:
+        return f"above {schema['exclusiveMinimum']}"
+    if "minimum" in schema:
+        return f"at least {schema['minimum']}"
+    return "true, false" if schema.get("type") == "boolean" else "object"
+
+
+def codes(names):
+    return ", ".join(f"`{name}`" for name in names)
 
 
 def errors(page):
@@ -116,15 +176,15 @@ def errors(page):
     return text + table(["code", "HTTP status", "meaning", "advice"], *rows)
 
 
-def errors_page(program):
-    """Returns the HTML of /docs/errors, from a service that runs only for this."""
+def served(program, *paths):
+    """Returns the texts at these paths of a service that runs only for this."""
     with tempfile.TemporaryDirectory() as data:
         words = [program, "serve", "--no-sample", "--bind", "127.0.0.1:0", "--data", data, "--log", "error"]
         with subprocess.Popen(words, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True) as service:
             addresses = (re.search(r"http://[\d.:]+/", line) for line in service.stderr)
             address = next(filter(None, addresses), None) or sys.exit("reference.py: the service did not start")
             try:
-                return urllib.request.urlopen(f"{address[0]}docs/errors", timeout=30).read().decode()
+                return [urllib.request.urlopen(f"{address[0]}{path}", timeout=30).read().decode() for path in paths]
             finally:
                 service.terminate()
 
@@ -136,7 +196,9 @@ def main():
     options = parser.parse_args()
     program = str(Path(options.program).resolve())
     root = read(program)
-    texts = {"command-line": command_line(root), "settings": settings(root), "errors": errors(errors_page(program))}
+    codes_page, document = served(program, "docs/errors", "openapi.json")
+    texts = {"command-line": command_line(root), "errors": errors(codes_page)}
+    texts["settings"] = settings(root, json.loads(document))
     pages = {PAGES / f"{name}.md": text for name, text in texts.items()}
     differing = [page for page, text in pages.items() if not page.is_file() or page.read_text() != text]
     if options.check and differing:

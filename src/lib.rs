@@ -11,6 +11,7 @@ pub mod geometry; // angles, rectangles, the pinhole camera
 pub mod ids; // identifiers of stored things
 pub mod library; // result of an analysis: poses, sprites, transitions, patches
 pub mod order; // medians and percentiles
+pub mod parameters; // limits and presets of parameters, and their check
 pub mod progress; // progress reports and cancellation
 pub mod random; // counter-based random numbers
 pub mod raster; // frames, images, masks, components, resampling, blending

@@ -30,15 +30,14 @@ pub(super) struct AnalysisRequest {
     /// Footage to measure.
     #[schema(value_type = uuid::Uuid)]
     footage_id: FootageId,
-    /// Parameters to override. They override the values of `preset` (`papers`), or the defaults if there is
-    /// no preset.
+    /// Parameters to override. They override the values of `preset`, or the defaults if there is no preset.
     #[serde(default)]
     #[schema(value_type = AnalysisOverrides)]
     params: Map<String, Value>,
 }
 
-/// Parameters of an analysis to override. They override the values of `preset` (`papers`), or the defaults if
-/// there is no preset.
+/// Parameters of an analysis to override. They override the values of `preset`, or the defaults if there is no
+/// preset.
 #[derive(ToSchema)]
 #[expect(
     dead_code,

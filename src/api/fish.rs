@@ -30,7 +30,7 @@ const FILES: Files = &[
 
 /// Library and parameters of a virtual fish.
 ///
-/// The parameters override the values of `preset` (`papers`), or the defaults if there is no preset.
+/// The parameters override the values of `preset`, or the defaults if there is no preset.
 #[derive(Debug, Deserialize, ToSchema)]
 pub(super) struct FishRequest {
     /// Library whose poses move the fish.

@@ -49,8 +49,7 @@ const MOST_PREVIEWED: u64 = 200_000;
 
 /// Library and parameters of a flock.
 ///
-/// The parameters override the values of `preset`, or the defaults if there is no preset. The presets are
-/// `school`, `swarm`, `mill`, `scatter`, `zonal` and `papers`.
+/// The parameters override the values of `preset`, or the defaults if there is no preset.
 #[derive(Debug, Deserialize, ToSchema)]
 pub(super) struct FlockRequest {
     /// Library to make the flock from.
@@ -96,8 +95,7 @@ pub(super) struct FlockForm {
 
 /// Parameters of a flock to override.
 ///
-/// They override the values of `preset`, or the defaults if there is no preset. The presets are `school`,
-/// `swarm`, `mill`, `scatter`, `zonal` and `papers`.
+/// They override the values of `preset`, or the defaults if there is no preset.
 #[derive(ToSchema)]
 #[expect(
     dead_code,

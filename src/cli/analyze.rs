@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
-use super::set::Set;
-use super::{Error, Listener, Summary};
+use super::{Error, Listener, Summary, set};
 use crate::analysis::{self, Params};
 use crate::cpu;
 use crate::footage::{FrameSource, Part};
@@ -47,22 +46,16 @@ pub struct Args {
     /// Height of the animal's silhouette, fins included, metres. Needs --animal-length.
     #[arg(long, value_name = "M", requires = "animal_length")]
     animal_height: Option<f64>,
-    /// View from which the animal was filmed. Default: guessed.
-    #[arg(long, value_name = "side|top")]
+    #[arg(long, help = set::parameter_help::<Params>("view"))]
     view: Option<String>,
     /// Follow the largest animal if several move. Default: the footage is refused.
     #[arg(long)]
     follow_largest: bool,
-    /// Frame rate, frames per second, 0.01 to 1000. Every picture of the file is then used once. Default: as
-    /// the file says.
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "F", help = set::parameter_help::<Params>("fps"))]
     fps: Option<f64>,
-    /// Start of the measured part, seconds from the first frame of the file. Frames keep their numbers and
-    /// times in the film; those before have no animal. Default: the first frame.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", help = set::parameter_help::<Params>("from_s"))]
     from: Option<f64>,
-    /// End of the measured part, seconds from the first frame of the file. Default: the last frame.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", help = set::parameter_help::<Params>("to_s"))]
     to: Option<f64>,
     /// Position of the animal in one frame: frame number and pixels, such as 120:310,95. The analysis follows
     /// the object at this point.
@@ -72,32 +65,23 @@ pub struct Args {
     /// 10,20,200,40@0-2.5. Repeatable.
     #[arg(long, value_name = "X,Y,W,H[@FROM-TO]")]
     ignore: Vec<String>,
-    /// Width of a pixel divided by its height, 0.1 to 10. Default: as the file says.
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", help = set::parameter_help::<Params>("pixel_aspect"))]
     pixel_aspect: Option<f64>,
-    /// Clip length in frames, 1 to 120. Default: 8 at 30 frames per second, in proportion to the frame rate.
-    #[arg(long, value_name = "F")]
+    #[arg(long, value_name = "F", help = set::parameter_help::<Params>("clip_frames"))]
     clip_frames: Option<u32>,
-    /// Weights of the frames of a clip in distances: uniform (default), or binomial, where the middle counts
-    /// most.
-    #[arg(long, value_name = "uniform|binomial")]
+    #[arg(long, value_name = "NAME", help = set::parameter_help::<Params>("clip_weights"))]
     clip_weights: Option<String>,
-    /// Scale of sprites: native (default, as filmed), or depth, which gives all sprites of a side view one
-    /// height.
-    #[arg(long, value_name = "native|depth")]
+    #[arg(long, value_name = "NAME", help = set::parameter_help::<Params>("scale_mode"))]
     scale_mode: Option<String>,
-    /// Distance below which two clips are similar. Default: a multiple of the median distance of successive
-    /// clips.
-    #[arg(long, value_name = "E")]
+    #[arg(long, value_name = "E", help = set::parameter_help::<Params>("epsilon"))]
     epsilon: Option<u64>,
     /// Also write the video with the measured poses drawn over it.
     #[arg(long, value_name = "MP4")]
     overlay: Option<PathBuf>,
-    /// Preset to start from: papers, the method of the two papers. Other flags override its values.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help = set::presets_help::<Params>())]
     preset: Option<String>,
-    #[command(flatten)]
-    set: Set,
+    #[arg(long, value_name = "NAME=JSON", help = set::help("threshold=25"))]
+    set: Vec<String>,
 }
 
 /// Analyzes the video and writes the library. Prints advice about the footage to stderr.
@@ -180,43 +164,34 @@ fn write_views(folder: &Path, library: &Library) -> Result<(), Error> {
 
 /// Returns the preset with the parameters set by flags.
 fn params_of(args: &Args) -> Result<Params, Error> {
-    let mut wanted = Map::new();
-    let mut put = |name: &str, value: Option<Value>| {
-        if let Some(value) = value {
-            wanted.insert(name.to_owned(), value);
-        }
-    };
-    put("preset", args.preset.as_ref().map(|name| json!(name)));
-    put("view", args.view.as_ref().map(|view| json!(view)));
-    put("follow", args.follow_largest.then(|| json!("largest")));
-    put("fps", args.fps.map(|fps| json!(fps)));
-    let pixel_aspect = args.pixel_aspect;
-    put("pixel_aspect", pixel_aspect.map(|aspect| json!(aspect)));
-    put("from_s", args.from.map(|from_s| json!(from_s)));
-    put("to_s", args.to.map(|to_s| json!(to_s)));
-    let animal_at = args.animal_at.as_deref();
-    put("animal_at", animal_at.map(read_animal_at).transpose()?);
-    if !args.ignore.is_empty() {
-        let boxes = args.ignore.iter().map(|text| read_ignore(text));
-        let boxes = boxes.collect::<Result<Vec<Value>, Error>>()?;
-        put("ignore", Some(json!(boxes)));
-    }
-    put("clip_frames", args.clip_frames.map(|frames| json!(frames)));
-    let weights = args.clip_weights.as_ref();
-    put("clip_weights", weights.map(|weights| json!(weights)));
-    put(
-        "scale_mode",
-        args.scale_mode.as_ref().map(|mode| json!(mode)),
-    );
-    put("epsilon", args.epsilon.map(|epsilon| json!(epsilon)));
+    let animal_at = args.animal_at.as_deref().map(read_animal_at);
+    let ignored = args.ignore.iter().map(|text| read_ignore(text));
+    let ignored = ignored.collect::<Result<Vec<Value>, Error>>()?;
     let animal = args.animal_length.zip(args.animal_height);
-    put(
-        "animal",
-        animal.map(|(length, height)| json!({"length_m": length, "height_m": height})),
-    );
-    put("camera", args.camera.as_deref().map(read_json).transpose()?);
-    args.set.apply(&mut wanted)?;
-    params::read(wanted).map_err(|error| Error::Usage(error.to_string()))
+    let animal = animal.map(|(length, height)| json!({"length_m": length, "height_m": height}));
+    let given = [
+        ("preset", args.preset.clone().map(Value::from)),
+        ("view", args.view.clone().map(Value::from)),
+        ("follow", args.follow_largest.then(|| json!("largest"))),
+        ("fps", args.fps.map(Value::from)),
+        ("pixel_aspect", args.pixel_aspect.map(Value::from)),
+        ("from_s", args.from.map(Value::from)),
+        ("to_s", args.to.map(Value::from)),
+        ("animal_at", animal_at.transpose()?),
+        ("ignore", (!ignored.is_empty()).then(|| json!(ignored))),
+        ("clip_frames", args.clip_frames.map(Value::from)),
+        ("clip_weights", args.clip_weights.clone().map(Value::from)),
+        ("scale_mode", args.scale_mode.clone().map(Value::from)),
+        ("epsilon", args.epsilon.map(Value::from)),
+        ("animal", animal),
+        ("camera", args.camera.as_deref().map(read_json).transpose()?),
+    ];
+    let mut overrides: Map<String, Value> = given
+        .into_iter()
+        .filter_map(|(name, value)| Some((name.to_owned(), value?)))
+        .collect();
+    set::apply(&args.set, &mut overrides)?;
+    params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
 }
 
 /// Parses FRAME:X,Y.

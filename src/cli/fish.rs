@@ -5,8 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 
-use super::set::Set;
-use super::{Error, Listener, Summary};
+use super::{Error, Listener, Summary, set};
 use crate::fish::{self, Film, Motion, Params, side_by_side};
 use crate::formats::{glb, params};
 use crate::library::Library;
@@ -26,15 +25,12 @@ pub struct Args {
     /// Show the animal on the left and the virtual fish on the right. Needs .mp4.
     #[arg(long)]
     side_by_side: bool,
-    /// Preset to start from: `papers`, a rigid, upright fish that follows the measured values without
-    /// smoothing.
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help = set::presets_help::<Params>())]
     preset: Option<String>,
-    /// Its coat: goldfish, silver or bronze.
-    #[arg(long)]
+    #[arg(long, help = set::parameter_help::<Params>("palette"))]
     palette: Option<String>,
-    #[command(flatten)]
-    set: Set,
+    #[arg(long, value_name = "NAME=JSON", help = set::help("bank_rad=0.4"))]
+    set: Vec<String>,
 }
 
 /// Writes the virtual fish.
@@ -72,7 +68,7 @@ fn params_of(args: &Args) -> Result<Params, Error> {
         .into_iter()
         .filter_map(|(name, value)| Some((name.to_owned(), json!(value.as_ref()?))))
         .collect();
-    args.set.apply(&mut overrides)?;
+    set::apply(&args.set, &mut overrides)?;
     params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
 }
 

@@ -1,37 +1,72 @@
-//! The flag `--set NAME=JSON` of `analyze`, `flock` and `fish`: any parameter by its name in the API.
+//! Flags of `analyze`, `flock` and `fish` that set parameters: `--set NAME=JSON` for any parameter by its name in
+//! the API, and the help of flags for one parameter, which follows from its schema.
 //!
 //! A dot leads into an object: `--set matching.w_v=0.5` sets the field `w_v` of `matching` and leaves the others.
 
 use serde_json::{Map, Value, json};
 
 use super::Error;
+use crate::parameters::{Parameters, Schemas};
 
-/// Parameters given by name.
-#[derive(Debug, clap::Args)]
-pub(super) struct Set {
-    /// Set any parameter by its name in the API; the value is JSON, a bare word is a string. Repeatable. Example:
-    /// --set threshold=25.
-    #[arg(long = "set", value_name = "NAME=JSON")]
-    set: Vec<String>,
+/// Overrides parameters with the values of `--set`. Fails where one has no `=`, or a name leads into a value that is
+/// not an object.
+pub(super) fn apply(settings: &[String], overrides: &mut Map<String, Value>) -> Result<(), Error> {
+    for setting in settings {
+        let (name, value) = setting
+            .split_once('=')
+            .ok_or_else(|| Error::Usage(format!("--set takes NAME=JSON: {setting}")))?;
+        let value = serde_json::from_str(value).unwrap_or_else(|_| json!(value));
+        insert(overrides, name, value).ok_or_else(|| {
+            Error::Usage(format!(
+                "--set: the name leads into a value that is not an object: {name}"
+            ))
+        })?;
+    }
+    Ok(())
 }
 
-impl Set {
-    /// Overrides what `overrides` holds with the parameters given. Fails where one has no `=`, or a name leads into a value
-    /// that is not an object.
-    pub(super) fn apply(&self, overrides: &mut Map<String, Value>) -> Result<(), Error> {
-        for setting in &self.set {
-            let (name, value) = setting
-                .split_once('=')
-                .ok_or_else(|| Error::Usage(format!("--set takes NAME=JSON: {setting}")))?;
-            let value = serde_json::from_str(value).unwrap_or_else(|_| json!(value));
-            insert(overrides, name, value).ok_or_else(|| {
-                Error::Usage(format!(
-                    "--set: the name leads into a value that is not an object: {name}"
-                ))
-            })?;
-        }
-        Ok(())
+/// Returns the help of `--set`, with an example of the command.
+pub(super) fn help(example: &str) -> String {
+    format!(
+        "Set any parameter by its name in the API; the value is JSON, a bare word is a string. Repeatable. Example: \
+         --set {example}"
+    )
+}
+
+/// Returns the help of `--preset`.
+pub(super) fn presets_help<P: Parameters>() -> String {
+    let names = P::PRESETS.join(", ");
+    format!("Preset to start from. Other flags override its values [possible values: {names}]")
+}
+
+/// Returns the help of a flag that sets one parameter: its description, limits, default and values.
+pub(super) fn parameter_help<P: Parameters>(name: &str) -> String {
+    let schemas = Schemas::new::<P>();
+    let schema = schemas.parameter(name);
+    let inner = schema["oneOf"].get(0).unwrap_or(schema);
+    let description = inner["description"].as_str().unwrap_or_default();
+    let description = description.replace('\n', " ");
+    let mut help = description.replace("null = ", "Default: ");
+    match (
+        &schema["minimum"],
+        &schema["maximum"],
+        &schema["exclusiveMinimum"],
+    ) {
+        (min, max, _) if max.is_number() => help += &format!(" Limits: {min} to {max}."),
+        (_, _, min) if min.is_number() => help += &format!(" Above {min}."),
+        _ => {}
     }
+    let mut help = help.trim_end_matches('.').to_owned();
+    match &schema["default"] {
+        Value::Null => {}
+        Value::String(name) => help += &format!(" [default: {name}]"),
+        default => help += &format!(" [default: {default}]"),
+    }
+    let choices = schemas.choices(name);
+    if !choices.is_empty() {
+        help += &format!(" [possible values: {}]", choices.join(", "));
+    }
+    help
 }
 
 /// Inserts a value at a dotted name; `None` where the name leads into a value that is not an object.
@@ -53,11 +88,9 @@ mod tests {
     use super::*;
 
     fn applied(set: &[&str]) -> Result<Value, String> {
-        let set = Set {
-            set: set.iter().map(|&one| one.to_owned()).collect(),
-        };
+        let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
         let mut overrides = Map::from_iter([("rules".to_owned(), json!({"alignment": 2}))]);
-        let done = set.apply(&mut overrides).map_err(|error| error.to_string());
+        let done = apply(&set, &mut overrides).map_err(|error| error.to_string());
         done.map(|()| Value::Object(overrides))
     }
 
@@ -75,5 +108,23 @@ mod tests {
         assert!(applied(&["seed"]).unwrap_err().contains("NAME=JSON"));
         let sentence = applied(&["rules.alignment.x=1"]).unwrap_err();
         assert!(sentence.contains("rules.alignment.x"), "{sentence}");
+    }
+
+    #[test]
+    fn help_of_a_flag_follows_from_the_parameter() {
+        let help = parameter_help::<crate::flock::Params>("variation");
+        assert!(help.contains("Limits: 0 to 0.3 [default: 0.05]"), "{help}");
+        let help = parameter_help::<crate::flock::Params>("render.cut");
+        assert!(
+            help.ends_with("[default: fade] [possible values: fade, morph]"),
+            "{help}"
+        );
+        let help = parameter_help::<crate::analysis::Params>("view");
+        assert!(
+            help.ends_with("Default: guessed [possible values: side, top]"),
+            "{help}"
+        );
+        let help = parameter_help::<crate::analysis::Params>("kappa");
+        assert!(help.ends_with("Above 0 [default: 2.0]"), "{help}");
     }
 }

@@ -1,61 +1,57 @@
-//! Parameters of the virtual fish: colors, size, and motion
+//! Parameters of the virtual fish, with defaults and limits: colors, size, and motion
 //! (docs/explanation/algorithms.md, "Virtual fish").
 
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 use utoipa::ToSchema;
 
 use crate::library::Animal;
+use crate::parameters::Parameters;
 
 /// Parameters of the virtual fish. Every field has a default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, SmartDefault, Serialize, Deserialize, ToSchema)]
 #[schema(as = FishParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// Colors of the fish.
+    #[default(Palette::Goldfish)]
     pub palette: Palette,
-    /// Length from the nose to the tip of the tail, in metres, > 0. null = the length of the measured
-    /// animal, or 0.10 if it is unknown.
+    /// Length from the nose to the tip of the tail, in metres. null = the length of the measured animal,
+    /// or 0.10 if it is unknown.
+    #[schema(exclusive_minimum = 0)]
     pub length_m: Option<f64>,
-    /// Height of the whole silhouette, fins included, in metres, > 0. null = the height of the measured
-    /// animal, or 0.47 times the length if it is unknown.
+    /// Height of the whole silhouette, fins included, in metres. null = the height of the measured animal,
+    /// or 0.47 times the length if it is unknown.
+    #[schema(exclusive_minimum = 0)]
     pub height_m: Option<f64>,
     /// Whether the body bends. false = the rigid fish of Nakajima et al.
+    #[default = true]
     pub swim: bool,
-    /// Maximum roll angle in a turn, in radians, 0..=0.8. 0 = the fish stays upright.
+    /// Maximum roll angle in a turn, in radians. 0 = the fish stays upright.
+    #[default = 0.2]
+    #[schema(minimum = 0, maximum = 0.8)]
     pub bank_rad: f64,
-    /// Standard deviation of the Gaussian that smooths the motion over time, in seconds, 0..=1. 0 = no
-    /// smoothing.
+    /// Standard deviation of the Gaussian that smooths the motion over time, in seconds. 0 = no smoothing.
+    #[default = 0.06]
+    #[schema(minimum = 0, maximum = 1)]
     pub smooth_s: f64,
-    /// Longest gap in the measurement that is filled by interpolation, in seconds, 0..=5. The fish is
-    /// invisible during longer gaps.
+    /// Longest gap in the measurement that is filled by interpolation, in seconds. The fish is invisible
+    /// during longer gaps.
+    #[default = 0.5]
+    #[schema(minimum = 0, maximum = 5)]
     pub bridge_s: f64,
 }
 
 /// Color scheme of the virtual fish.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Palette {
     /// Common goldfish: orange, darker above, pale gold below.
-    #[default]
     Goldfish,
     /// Silver with a slate back.
     Silver,
     /// Nearly black above, bronze below.
     Bronze,
-}
-
-impl Default for Params {
-    fn default() -> Params {
-        Params {
-            palette: Palette::Goldfish,
-            length_m: None,
-            height_m: None,
-            swim: true,
-            bank_rad: 0.2,
-            smooth_s: 0.06,
-            bridge_s: 0.5,
-        }
-    }
 }
 
 impl Params {
@@ -82,23 +78,16 @@ impl Params {
             height_m: height_m.unwrap_or(length_m * DEFAULT_HEIGHT_BL),
         }
     }
+}
 
-    /// Checks the range of every field. The error names the field and its range.
-    pub fn check(&self) -> Result<(), String> {
-        for (name, value) in [("length_m", self.length_m), ("height_m", self.height_m)] {
-            if value.is_some_and(|v| !(v.is_finite() && v > 0.0)) {
-                return Err(format!("{name} must be above 0: {value:?}"));
-            }
-        }
-        for (name, value, most) in [
-            ("bank_rad", self.bank_rad, 0.8),
-            ("smooth_s", self.smooth_s, 1.0),
-            ("bridge_s", self.bridge_s, 5.0),
-        ] {
-            if !(0.0..=most).contains(&value) {
-                return Err(format!("{name} must lie in 0..={most}: {value}"));
-            }
-        }
+impl Parameters for Params {
+    const PRESETS: &'static [&'static str] = &["papers"];
+
+    fn preset(name: &str) -> Option<Params> {
+        (name == "papers").then(Params::papers)
+    }
+
+    fn check_combinations(&self) -> Result<(), String> {
         Ok(())
     }
 }
@@ -114,14 +103,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_presets_lie_in_their_ranges_and_a_negative_length_does_not() {
+    fn presets_pass_the_check_and_a_negative_length_does_not() {
         assert_eq!(Params::default().check(), Ok(()));
         assert_eq!(Params::papers().check(), Ok(()));
         let wrong = Params {
             length_m: Some(-0.1),
             ..Params::default()
         };
-        assert!(wrong.check().is_err_and(|why| why.contains("length_m")));
+        let sentence = "length_m must be above 0: -0.1";
+        assert_eq!(wrong.check(), Err(sentence.into()));
         let wrong = Params {
             bank_rad: f64::NAN,
             ..Params::default()

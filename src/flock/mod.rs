@@ -46,7 +46,8 @@ use self::placement::{Placed, Placer};
 use self::plan::{Model, Plan, Planner};
 use crate::geometry::rounded;
 use crate::library::Library;
-use crate::progress::{CancelOnly, Progress};
+use crate::parameters::Parameters;
+use crate::progress::{Progress, Quiet};
 
 /// A simulated, planned and placed flock, without its pixels.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,20 +1,12 @@
 //! Parameters from JSON: `{"preset": "papers", "kappa": 3}` overrides values of a preset; without a preset it
 //! overrides the defaults. All kinds of parameters use this module.
 
-use serde::de::{DeserializeOwned, Error as _};
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
-use crate::{analysis, fish, flock};
-
-/// Parameters with presets and ranges.
-pub trait Preset: Serialize + DeserializeOwned + Default {
-    /// Returns the parameters of a preset by name, if it exists.
-    fn preset(name: &str) -> Option<Self>;
-
-    /// Checks all ranges. The error names the parameter and its range.
-    fn check(&self) -> Result<(), String>;
-}
+use crate::analysis;
+use crate::parameters::Parameters;
 
 /// Reasons why a JSON object is not a valid set of parameters.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -29,7 +21,7 @@ pub enum Error {
 
 /// Returns the parameters of an object with an optional `preset` and overrides. The error names the
 /// parameter.
-pub fn read<P: Preset>(mut overrides: Map<String, Value>) -> Result<P, Error> {
+pub fn read<P: Parameters>(mut overrides: Map<String, Value>) -> Result<P, Error> {
     let start = match overrides.remove("preset") {
         None | Some(Value::Null) => P::default(),
         Some(name) => {
@@ -56,36 +48,6 @@ fn override_with(value: &mut Value, overrides: Value) {
     }
 }
 
-impl Preset for analysis::Params {
-    fn preset(name: &str) -> Option<Self> {
-        (name == "papers").then(analysis::Params::papers)
-    }
-
-    fn check(&self) -> Result<(), String> {
-        analysis::Params::check(self)
-    }
-}
-
-impl Preset for flock::Params {
-    fn preset(name: &str) -> Option<Self> {
-        flock::Params::preset(name)
-    }
-
-    fn check(&self) -> Result<(), String> {
-        flock::Params::check(self)
-    }
-}
-
-impl Preset for fish::Params {
-    fn preset(name: &str) -> Option<Self> {
-        (name == "papers").then(fish::Params::papers)
-    }
-
-    fn check(&self) -> Result<(), String> {
-        fish::Params::check(self)
-    }
-}
-
 /// Parameters of an analysis that no longer exist. Files of older versions hold them.
 const REMOVED: [&str; 1] = ["approximate"];
 
@@ -108,18 +70,19 @@ fn invalid(error: serde_json::Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flock;
 
     fn analysis(json: &str) -> Result<analysis::Params, Error> {
         read(serde_json::from_str(json).unwrap())
     }
 
     #[test]
-    fn nothing_asked_for_gives_the_defaults() {
+    fn empty_object_gives_the_defaults() {
         assert_eq!(analysis("{}"), Ok(analysis::Params::default()));
     }
 
     #[test]
-    fn a_preset_is_the_start_and_the_rest_overrides_it() {
+    fn parameters_override_the_values_of_the_preset() {
         let papers = analysis::Params::papers();
         assert_eq!(
             analysis(r#"{"preset": "papers", "mirror": true}"#),
@@ -131,8 +94,8 @@ mod tests {
     }
 
     #[test]
-    fn every_preset_of_a_flock_can_be_asked_for() {
-        for name in flock::Params::PRESETS {
+    fn every_preset_of_a_flock_is_read_by_name() {
+        for &name in flock::Params::PRESETS {
             let overrides = Map::from_iter([("preset".to_owned(), Value::from(name))]);
             assert_eq!(read(overrides).ok(), flock::Params::preset(name), "{name}");
         }
@@ -142,12 +105,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_or_out_of_range_is_named() {
-        let said = |json| analysis(json).unwrap_err().to_string();
-        assert_eq!(said(r#"{"preset": "p"}"#), "the preset is unknown: \"p\"");
-        assert!(said(r#"{"colour": 1}"#).contains("colour"));
+    fn unknown_names_and_values_out_of_range_are_named() {
+        let error = |json| analysis(json).unwrap_err().to_string();
+        assert_eq!(error(r#"{"preset": "p"}"#), "the preset is unknown: \"p\"");
+        assert!(error(r#"{"colour": 1}"#).contains("colour"));
         assert_eq!(
-            said(r#"{"threshold": 0}"#),
+            error(r#"{"threshold": 0}"#),
             "threshold must lie in 1..=254: 0"
         );
     }

@@ -6,9 +6,6 @@ use utoipa::ToSchema;
 use super::Params;
 use crate::geometry::Rect;
 
-/// Largest number of boxes to ignore. Free choice.
-const MOST_IGNORED: usize = 64;
-
 /// The position of the animal in one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -17,6 +14,7 @@ pub struct AnimalAtParam {
     pub frame: u32,
     /// A point on the animal, pixels.
     #[serde(alias = "point")]
+    #[schema(min_items = 2, max_items = 2)]
     pub at_px: [f64; 2],
 }
 
@@ -25,12 +23,15 @@ pub struct AnimalAtParam {
 #[serde(deny_unknown_fields)]
 pub struct IgnoreParam {
     /// Left, top, width and height, pixels.
+    #[schema(min_items = 4, max_items = 4)]
     pub box_px: [u32; 4],
     /// Start time, seconds. null = from the start of the footage.
     #[serde(default)]
+    #[schema(default = json!(null), minimum = 0)]
     pub from_s: Option<f64>,
     /// End time, seconds. null = to the end of the footage.
     #[serde(default)]
+    #[schema(default = json!(null), exclusive_minimum = 0)]
     pub to_s: Option<f64>,
 }
 
@@ -62,20 +63,9 @@ impl Params {
         self.ignore.iter().filter(holds).map(clipped).collect()
     }
 
-    /// Checks the hints. The error names the invalid parameter.
+    /// Checks that time spans are not empty and that boxes have pixels.
     pub(super) fn check_hints(&self) -> Result<(), String> {
         check_span("", self.from_s, self.to_s)?;
-        if let Some(at) = self.animal_at
-            && at.at_px.iter().any(|v| !v.is_finite())
-        {
-            return Err("animal_at.at_px must be two finite numbers".into());
-        }
-        if self.ignore.len() > MOST_IGNORED {
-            let n = self.ignore.len();
-            return Err(format!(
-                "ignore must have at most {MOST_IGNORED} boxes: {n}"
-            ));
-        }
         for ignore in &self.ignore {
             check_span("ignore.", ignore.from_s, ignore.to_s)?;
             let [x, y, w, h] = ignore.box_px;
@@ -89,13 +79,12 @@ impl Params {
     }
 }
 
-/// Checks that a time span is valid: 0 <= from < to.
+/// Checks that a time span is not empty.
 fn check_span(name: &str, from_s: Option<f64>, to_s: Option<f64>) -> Result<(), String> {
-    let (from_s, to_s) = (from_s.unwrap_or(0.0), to_s.unwrap_or(f64::MAX));
-    match 0.0 <= from_s && from_s < to_s && to_s.is_finite() {
-        true => Ok(()),
-        false => Err(format!(
+    match (from_s.unwrap_or(0.0), to_s) {
+        (from_s, Some(to_s)) if from_s >= to_s => Err(format!(
             "{name}from_s must be at least 0 and before {name}to_s: {from_s}"
         )),
+        _ => Ok(()),
     }
 }

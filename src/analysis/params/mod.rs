@@ -1,9 +1,10 @@
-//! Parameters of an analysis: defaults, ranges and presets. docs/explanation/algorithms.md explains the
+//! Parameters of an analysis, with defaults, limits and presets. docs/explanation/algorithms.md explains the
 //! defaults.
 
 mod hints;
 
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 use utoipa::ToSchema;
 
 pub use hints::{AnimalAtParam, IgnoreParam};
@@ -11,25 +12,31 @@ pub use hints::{AnimalAtParam, IgnoreParam};
 use super::distance::Clip;
 use crate::geometry::Camera;
 use crate::library::{Animal, View};
+use crate::parameters::Parameters;
 
 /// Parameters of an analysis. All have defaults.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, SmartDefault, Serialize, Deserialize, ToSchema)]
 #[schema(as = AnalysisParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Frame rate, frames per second, 0.01..=1000. null = as the file says. When set, each picture of the
-    /// file is used once.
+    /// Frame rate, frames per second. null = as the file says. When set, each picture of the file is used
+    /// once.
+    #[schema(minimum = 0.01, maximum = 1000)]
     pub fps: Option<f64>,
-    /// Width of a pixel divided by its height, 0.1..=10. null = as the file says.
+    /// Width of a pixel divided by its height. null = as the file says.
+    #[schema(minimum = 0.1, maximum = 10)]
     pub pixel_aspect: Option<f64>,
     /// Start of the measured part, seconds from the first frame of the file. null = the first frame. Frames
     /// keep their numbers and times in the film; those before have no animal.
+    #[schema(minimum = 0)]
     pub from_s: Option<f64>,
     /// End of the measured part, seconds from the first frame of the file. null = the last frame.
+    #[schema(exclusive_minimum = 0)]
     pub to_s: Option<f64>,
     /// Position of the animal in one frame. The analysis follows the object there, whatever else moves.
     pub animal_at: Option<AnimalAtParam>,
-    /// Boxes in which nothing counts as the animal, at most 64.
+    /// Boxes in which nothing counts as the animal.
+    #[schema(max_items = 64)]
     pub ignore: Vec<IgnoreParam>,
     /// View from which the animal was filmed. null = guessed.
     pub view: Option<ViewParam>,
@@ -37,37 +44,54 @@ pub struct Params {
     pub camera: Option<CameraParams>,
     /// Known size of the animal. null = no depth.
     pub animal: Option<AnimalParams>,
-    /// Smallest difference from the background that counts as the animal, 1..=254 of 255.
+    /// Smallest difference from the background that counts as the animal, levels of 255.
+    #[default = 18]
+    #[schema(minimum = 1, maximum = 254)]
     pub threshold: u8,
     /// Behavior when several animals move.
+    #[default(Follow::One)]
     pub follow: Follow,
     /// Whether to cut out sprites of an animal that is too small to show.
+    #[default(CutSprites::Auto)]
     pub sprites: CutSprites,
-    /// Scale of the sprites.
+    /// Scale of the sprites: `native` as filmed, `depth` at one height in side view.
+    #[default(ScaleMode::Native)]
     pub scale_mode: ScaleMode,
     /// Position of the head in one frame. It decides between head and tail.
     pub head: Option<HeadParam>,
     /// Whether to smooth positions and directions over time. false = the raw values of each frame.
+    #[default = true]
     pub smooth: bool,
-    /// Clip length f, frames, 1..=120. null = 8 at 30 frames per second, in proportion to the frame rate.
+    /// Clip length f, frames. null = 8 at 30 frames per second, in proportion to the frame rate. At most 24 with
+    /// `clip_weights: binomial`.
+    #[schema(minimum = 1, maximum = 120)]
     pub clip_frames: Option<u32>,
-    /// Weights of the frames of a clip in the distance.
+    /// Weights of the frames of a clip in the distance: equal, or binomial, where the middle counts most.
+    #[default(ClipWeights::Uniform)]
     pub clip_weights: ClipWeights,
     /// Distance below which two clips are similar. null = `kappa` times the natural step.
     pub epsilon: Option<u64>,
-    /// Multiple of the natural step that gives `epsilon` when that is null, > 0. If playback is then too
-    /// short, the analysis tries larger values.
+    /// Multiple of the natural step that gives `epsilon` when that is null. If playback is then too short,
+    /// the analysis tries larger values.
+    #[default = 2.0]
+    #[schema(exclusive_minimum = 0)]
     pub kappa: f64,
-    /// Largest difference between the mean headings of two similar clips in side view, degrees, 0..=180.
+    /// Largest difference between the mean headings of two similar clips in side view, degrees.
+    #[default = 15.0]
+    #[schema(minimum = 0, maximum = 180)]
     pub heading_gate_deg: f64,
     /// Image planes that are compared: color and alpha (`rgba`), or color only (`rgb`, Okabe et al., equation
     /// 3).
+    #[default(Planes::Rgba)]
     pub planes: Planes,
     /// Whether sprites may also be shown mirrored.
+    #[default = true]
     pub mirror: bool,
     /// Reading of Nakajima et al., equation 7: `corrected`, or `printed`, with the quotient inverted.
+    #[default(Eq7::Corrected)]
     pub eq7: Eq7,
     /// Method for the length axis and the head: `corrected`, or `printed` as in the two papers.
+    #[default(AxisAndHead::Corrected)]
     pub axis_and_head: AxisAndHead,
 }
 
@@ -96,15 +120,19 @@ pub enum ViewParam {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraParams {
-    /// Distance from the camera to the front pane, metres, > 0.
+    /// Distance from the camera to the front pane, metres.
+    #[schema(exclusive_minimum = 0)]
     pub z_min_m: f64,
-    /// Pixels per metre on the pane, > 0.
+    /// Pixels per metre on the pane.
+    #[schema(exclusive_minimum = 0)]
     pub pane_px_per_m: f64,
     /// Image point on the optical axis, pixels. null = the center of the image.
     #[serde(default)]
+    #[schema(default = json!(null), min_items = 2, max_items = 2)]
     pub center_px: Option<[f64; 2]>,
-    /// Refractive index behind the pane, > 0: 1 for air (Nakajima et al.), 1.333 for water.
+    /// Refractive index behind the pane: 1 for air (Nakajima et al.), 1.333 for water.
     #[serde(default = "air")]
+    #[schema(default = air, exclusive_minimum = 0)]
     pub medium_index: f64,
 }
 
@@ -112,9 +140,11 @@ pub struct CameraParams {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AnimalParams {
-    /// Length from the nose to the tip of the tail, metres, > 0.
+    /// Length from the nose to the tip of the tail, metres.
+    #[schema(exclusive_minimum = 0)]
     pub length_m: f64,
-    /// Height of the silhouette, fins included, metres, > 0.
+    /// Height of the silhouette, fins included, metres.
+    #[schema(exclusive_minimum = 0)]
     pub height_m: f64,
 }
 
@@ -125,6 +155,7 @@ pub struct HeadParam {
     /// Frame number, counted from 0.
     pub frame: u32,
     /// A point nearer to the head than to the tail, pixels.
+    #[schema(min_items = 2, max_items = 2)]
     pub point: [f64; 2],
 }
 
@@ -192,37 +223,6 @@ pub enum AxisAndHead {
     Printed,
 }
 
-impl Default for Params {
-    fn default() -> Params {
-        Params {
-            fps: None,
-            pixel_aspect: None,
-            from_s: None,
-            to_s: None,
-            animal_at: None,
-            ignore: Vec::new(),
-            view: None,
-            camera: None,
-            animal: None,
-            threshold: 18,
-            follow: Follow::One,
-            sprites: CutSprites::Auto,
-            scale_mode: ScaleMode::Native,
-            head: None,
-            smooth: true,
-            clip_frames: None,
-            clip_weights: ClipWeights::Uniform,
-            epsilon: None,
-            kappa: 2.0,
-            heading_gate_deg: 15.0,
-            planes: Planes::Rgba,
-            mirror: true,
-            eq7: Eq7::Corrected,
-            axis_and_head: AxisAndHead::Corrected,
-        }
-    }
-}
-
 impl Params {
     /// Returns the preset `papers`, as far as the papers specify the parameters: raw values, axis and head as
     /// printed, RGB planes, no mirroring.
@@ -241,9 +241,7 @@ impl Params {
     pub fn clip_frames_at(&self, fps: f64) -> usize {
         match self.clip_frames {
             Some(frames) => frames as usize,
-            None => {
-                ((fps * 8.0 / 30.0).round() as usize).clamp(2, self.most_clip_frames() as usize)
-            }
+            None => ((fps * 8.0 / 30.0).round() as usize).clamp(2, self.max_clip_frames() as usize),
         }
     }
 
@@ -283,71 +281,30 @@ impl Params {
 
     /// Returns the largest clip length, frames. Binomial coefficients of longer clips would overflow the
     /// distances.
-    fn most_clip_frames(&self) -> u32 {
+    fn max_clip_frames(&self) -> u32 {
         match self.clip_weights {
             ClipWeights::Uniform => 120,
             ClipWeights::Binomial => 24,
         }
     }
-
-    /// Checks all ranges. The error names the parameter and its range.
-    pub fn check(&self) -> Result<(), String> {
-        let positive = |name: &str, value: f64| {
-            (value.is_finite() && value > 0.0)
-                .then_some(())
-                .ok_or(format!("{name} must be above 0: {value}"))
-        };
-        positive("kappa", self.kappa)?;
-        within("fps", self.fps, 0.01..=1000.0)?;
-        within("pixel_aspect", self.pixel_aspect, 0.1..=10.0)?;
-        self.check_hints()?;
-        if !(0.0..=180.0).contains(&self.heading_gate_deg) {
-            return Err(format!(
-                "heading_gate_deg must lie in 0..=180: {}",
-                self.heading_gate_deg
-            ));
-        }
-        if !(1..=254).contains(&self.threshold) {
-            return Err(format!("threshold must lie in 1..=254: {}", self.threshold));
-        }
-        if let Some(frames) = self.clip_frames
-            && !(1..=self.most_clip_frames()).contains(&frames)
-        {
-            let most = self.most_clip_frames();
-            return Err(format!("clip_frames must lie in 1..={most}: {frames}"));
-        }
-        if let Some(camera) = self.camera {
-            positive("camera.z_min_m", camera.z_min_m)?;
-            positive("camera.pane_px_per_m", camera.pane_px_per_m)?;
-            positive("camera.medium_index", camera.medium_index)?;
-            if camera
-                .center_px
-                .is_some_and(|c| c.iter().any(|v| !v.is_finite()))
-            {
-                return Err("camera.center_px must be two finite numbers".into());
-            }
-        }
-        if let Some(animal) = self.animal {
-            positive("animal.length_m", animal.length_m)?;
-            positive("animal.height_m", animal.height_m)?;
-        }
-        Ok(())
-    }
 }
 
-/// Checks that a value is in a range, if it is set.
-fn within(
-    name: &str,
-    value: Option<f64>,
-    range: std::ops::RangeInclusive<f64>,
-) -> Result<(), String> {
-    match value {
-        Some(value) if !range.contains(&value) => Err(format!(
-            "{name} must lie in {}..={}: {value}",
-            range.start(),
-            range.end()
-        )),
-        _ => Ok(()),
+impl Parameters for Params {
+    const PRESETS: &'static [&'static str] = &["papers"];
+
+    fn preset(name: &str) -> Option<Params> {
+        (name == "papers").then(Params::papers)
+    }
+
+    fn check_combinations(&self) -> Result<(), String> {
+        self.check_hints()?;
+        let max = self.max_clip_frames();
+        match self.clip_frames {
+            Some(frames) if frames > max => {
+                Err(format!("clip_frames must lie in 1..={max}: {frames}"))
+            }
+            _ => Ok(()),
+        }
     }
 }
 

@@ -3,13 +3,18 @@
 use axum::Router;
 use axum::http::header;
 use axum::routing::get;
+use serde_json::Value;
 use utoipa::Modify;
 use utoipa::openapi::path::{Operation, ParameterBuilder, ParameterIn};
-use utoipa::openapi::schema::{AdditionalProperties, ObjectBuilder, Schema, Type};
+use utoipa::openapi::schema::{
+    AdditionalProperties, Object, ObjectBuilder, Schema, SchemaType, Type,
+};
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa::openapi::{OpenApi, RefOr, Required};
 
 use crate::api::{AppState, idempotency};
+use crate::parameters::Parameters;
+use crate::{analysis, fish, flock};
 
 /// Title and security schemes of the document. The routes add their own entries.
 #[derive(utoipa::OpenApi)]
@@ -55,18 +60,17 @@ pub(in crate::api) fn join_flattened(document: &mut OpenApi) {
     let Some(components) = &mut document.components else {
         return;
     };
-    for name in [
-        "AnalysisOverrides",
-        "FlockOverrides",
-        "FlockRequest",
-        "FishRequest",
+    for (name, presets) in [
+        ("AnalysisOverrides", analysis::Params::PRESETS),
+        ("FlockOverrides", flock::Params::PRESETS),
+        ("FlockRequest", flock::Params::PRESETS),
+        ("FishRequest", fish::Params::PRESETS),
     ] {
         let Some(RefOr::T(Schema::AllOf(all))) = components.schemas.get(name) else {
             continue;
         };
         let mut joined = ObjectBuilder::new()
             .additional_properties(Some(AdditionalProperties::FreeForm(false)))
-            .property("preset", ObjectBuilder::new().schema_type(Type::String))
             .build();
         joined.description.clone_from(&all.description);
         for part in &all.items {
@@ -80,9 +84,24 @@ pub(in crate::api) fn join_flattened(document: &mut OpenApi) {
                 joined.required.extend(part.required.clone());
             }
         }
+        let preset = RefOr::T(Schema::Object(preset_schema(presets)));
+        joined.properties.insert("preset".to_owned(), preset);
         let joined = RefOr::T(Schema::Object(joined));
         components.schemas.insert(name.to_owned(), joined);
     }
+}
+
+/// Returns the schema of the name of a preset.
+fn preset_schema(presets: &[&str]) -> Object {
+    let names = presets.iter().copied().map(Value::from);
+    ObjectBuilder::new()
+        .schema_type(SchemaType::from_iter([Type::String, Type::Null]))
+        .enum_values(Some(names.chain([Value::Null])))
+        .default(Some(Value::Null))
+        .description(Some(
+            "Preset to start from. Other parameters override its values. null = the defaults.",
+        ))
+        .build()
 }
 
 fn add_header(operation: &mut Operation, name: &str, meaning: &str) {

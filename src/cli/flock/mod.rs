@@ -13,8 +13,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Map, Value, json};
 
 use self::outputs::Outputs;
-use super::set::Set;
-use super::{Error, Listener, Summary};
+use super::{Error, Listener, Summary, set};
 use crate::flock::advice::Advice;
 use crate::flock::{Flock, Params, plan_flock};
 use crate::formats::{flock_json, params, svg};
@@ -29,30 +28,25 @@ pub struct Args {
     library: PathBuf,
     #[command(flatten)]
     outputs: Outputs,
-    /// Number of individuals, 1 to 10000. Default: as many as the tank has room for, 2 to 20.
-    #[arg(long)]
+    #[arg(long, help = set::parameter_help::<Params>("count"))]
     count: Option<u32>,
-    /// Target of the mean distance to the nearest neighbor in the image, body lengths, 0.2 to 10.
-    #[arg(long, value_name = "BL")]
+    #[arg(long, value_name = "BL", help = set::parameter_help::<Params>("spacing_bl"))]
     spacing: Option<f64>,
-    /// Length in frames, 1 to 1000000. Individuals times frames is at most 4000000. Default: 400.
-    #[arg(long)]
+    #[arg(long, help = set::parameter_help::<Params>("frames"))]
     frames: Option<u32>,
-    /// Random seed. The same library, parameters and seed give the same flock. Default: 1.
-    #[arg(long)]
+    #[arg(long, help = set::parameter_help::<Params>("seed"))]
     seed: Option<u64>,
     /// Make a loop: the last frame leads into the first, so that the film repeats without a seam. A loop has
     /// 30 to 5000 frames. Use at least 10 seconds, so that the individuals have time to swim back.
     #[arg(long = "loop")]
     is_loop: bool,
-    /// Preset to start from: school, swarm, mill, scatter, zonal or papers. Other flags override its values.
-    #[arg(long)]
+    #[arg(long, help = set::presets_help::<Params>())]
     preset: Option<String>,
     /// Steering rules of the boids to override, as JSON: '{"alignment": 2, "cohesion_bl": 8}'.
     #[arg(long, value_name = "JSON")]
     rules: Option<String>,
-    #[command(flatten)]
-    set: Set,
+    #[arg(long, value_name = "NAME=JSON", help = set::help("rules.wander=0.5"))]
+    set: Vec<String>,
     /// Write the plan, flock.json, here.
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
@@ -158,7 +152,7 @@ impl Args {
         for (name, value) in given {
             overrides.extend(value.map(|value| (name.to_owned(), value)));
         }
-        self.set.apply(&mut overrides)?;
+        set::apply(&self.set, &mut overrides)?;
         params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
     }
 }

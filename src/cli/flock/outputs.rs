@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use crate::cli::sample::parse_size;
-use crate::cli::{Error, extension};
+use crate::cli::{Error, set};
+use crate::flock::Params;
 use crate::flock::composite::params::{Background, Format, Render};
 use crate::jobs::flock::film::{Backdrop, Output, Target};
 use crate::media::{Limits, Video, read_image};
@@ -31,15 +32,11 @@ pub(super) struct Outputs {
     /// file of a picture or video.
     #[arg(long, value_name = "WHAT")]
     background: Option<String>,
-    /// Drawing method at a jump: fade (default) or morph.
-    #[arg(long, value_name = "fade|morph")]
+    #[arg(long, help = set::parameter_help::<Params>("render.cut"))]
     cut: Option<String>,
-    /// Share of an animal's color that haze replaces per body length of depth, 0 to 1. Default: 0, no haze.
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", help = set::parameter_help::<Params>("render.haze_per_bl"))]
     haze: Option<f64>,
-    /// Darkness of the shadows on the floor, 0 to 1. 0 disables them. Default: as measured in top view, none
-    /// in side view.
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", help = set::parameter_help::<Params>("render.shadow"))]
     shadow: Option<f64>,
     /// Also write a video that marks the position and heading of every boid.
     #[arg(long, value_name = "MP4")]

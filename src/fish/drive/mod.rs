@@ -15,6 +15,7 @@ use super::params::Params;
 use super::spine::{N_JOINTS, Swimming, effort_at, joint_angles_of_midline_rad, tail_beat_hz};
 use crate::geometry::Camera;
 use crate::library::{Animal, Pose, Poses, View};
+use crate::parameters::Parameters;
 
 /// Returns the motion of the virtual fish. Fails if a parameter is out of range, or if the animal was found
 /// in no frame.

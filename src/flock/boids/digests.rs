@@ -6,6 +6,7 @@ use super::params::{Goal, Obstacle, Predator};
 use super::tank::Tank;
 use super::*;
 use crate::flock::lens::Lens;
+use crate::parameters::Parameters;
 
 /// Digests of each preset: in a flat tank, in a tank three body lengths deep, and there with limited slopes.
 const DIGESTS: [(&str, [u64; 3]); 6] = [

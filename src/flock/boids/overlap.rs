@@ -182,6 +182,7 @@ mod tests {
     use crate::flock::boids::tank::Tank;
     use crate::flock::boids::vector::norm;
     use crate::flock::lens::Lens;
+    use crate::parameters::Parameters;
 
     #[test]
     fn boids_that_meet_within_a_step_are_pushed_apart() {

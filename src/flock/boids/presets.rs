@@ -8,6 +8,7 @@ use super::params::Zones;
 use super::vector::{add_scaled, cross, minus, norm, unit};
 use super::*;
 use crate::flock::lens::Lens;
+use crate::parameters::Parameters;
 
 impl<'a> Boids<'a> {
     /// Returns boids that have formed a flock.

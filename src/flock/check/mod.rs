@@ -21,6 +21,7 @@ use super::params::{MatchBy, Position};
 use super::{Flock, Individual};
 use crate::geometry::Turns;
 use crate::library::Library;
+use crate::parameters::Parameters;
 use crate::progress::Progress;
 
 /// Tolerance of a cost in the file, radians: it has 6 decimals, and a turn has 0.0001 rad.

@@ -1,42 +1,50 @@
-//! Parameters of a flock's film: size, background, drawing at jumps, and files to write.
+//! Parameters of a flock's film, with defaults and limits: size, background, drawing at jumps, and files.
 //!
 //! These parameters change only the drawing. The flock's motion and its plans stay the same
 //! (docs/explanation/algorithms.md, "Compositing").
 
 use serde::{Deserialize, Serialize};
+use smart_default::SmartDefault;
 use utoipa::ToSchema;
 
 /// Parameters of a flock's film. Every field has a default.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, SmartDefault, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Render {
-    /// Width and height of the film in pixels: 16..=8192 each, and at most 8,294,400 pixels (3840 x 2160)
-    /// in total. null = the size of the footage. The film always shows the whole picture of the footage. A
-    /// film of another aspect ratio has bars.
+    /// Width and height of the film in pixels, at most 8,294,400 pixels (3840 x 2160) in total. null = the
+    /// size of the footage. The film always shows the whole picture of the footage. A film of another aspect
+    /// ratio has bars.
+    #[schema(value_type = Option<[SidePx; 2]>, inline, min_items = 2, max_items = 2)]
     pub size_px: Option<[u32; 2]>,
     /// Background of the film: `plate` (the background of the footage), `transparent`, or a color as
     /// `#rrggbb`. Formats without transparency use `plate` in place of `transparent`.
-    #[schema(value_type = String)]
+    #[default(Background::Plate)]
+    #[schema(value_type = String, pattern = "^(plate|transparent|#[0-9a-fA-F]{6})$")]
     pub background: Background,
     /// Drawing method at a jump: `fade` or `morph`.
+    #[default(Cut::Fade)]
     pub cut: Cut,
-    /// Share of an animal's color that haze replaces per body length of depth, 0..=1. 0 = no haze.
+    /// Share of an animal's color that haze replaces per body length of depth. 0 = no haze.
+    #[schema(minimum = 0, maximum = 1)]
     pub haze_per_bl: f64,
-    /// Darkness of the animals' shadows on the floor: the share of the light that a shadow removes, 0..=1.
-    /// 0 = no shadows. null = the darkness measured in top view. With null, side view has no shadows, nor
-    /// has a library without a measured shadow.
+    /// Darkness of the animals' shadows on the floor: the share of the light that a shadow removes.
+    /// 0 = no shadows. null = the darkness measured in top view, and no shadows in side view or without a
+    /// measurement.
+    #[schema(minimum = 0, maximum = 1)]
     pub shadow: Option<f64>,
     /// Files to write in addition to video.mp4.
+    #[default(_code = "vec![Format::Poster]")]
     pub formats: Vec<Format>,
     /// Whether to write overlay.mp4, which marks the position and heading of every boid (Okabe et al.,
     /// figure 10).
     pub overlay: bool,
     /// Whether to write ground-truth.zip and tracks.csv.
+    #[default = true]
     pub ground_truth: bool,
 }
 
 /// Maximum number of pixels in a frame, the same as for footage. Memory holds several copies of a frame.
-const MOST_PIXELS: u64 = 3840 * 2160;
+const MAX_PIXELS: u64 = 3840 * 2160;
 
 /// Background of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,45 +89,23 @@ pub enum Format {
     Poster,
 }
 
-impl Default for Render {
-    fn default() -> Render {
-        Render {
-            size_px: None,
-            background: Background::Plate,
-            cut: Cut::Fade,
-            haze_per_bl: 0.0,
-            shadow: None,
-            formats: vec![Format::Poster],
-            overlay: false,
-            ground_truth: true,
-        }
-    }
-}
+/// Schema of the width or height of a film, pixels.
+#[derive(ToSchema)]
+#[schema(minimum = 16, maximum = 8192)]
+#[expect(dead_code, reason = "it only describes numbers in the schema")]
+struct SidePx(u32);
 
 impl Render {
-    /// Checks the range of every field. The error names the field and its range.
-    pub fn check(&self) -> Result<(), String> {
-        for side in self.size_px.into_iter().flatten() {
-            if !(16..=8192).contains(&side) {
-                return Err(format!("render.size_px must lie in 16..=8192: {side}"));
+    /// Checks the number of pixels.
+    pub(in crate::flock) fn check_combinations(&self) -> Result<(), String> {
+        match self.size_px {
+            Some([width, height]) if u64::from(width) * u64::from(height) > MAX_PIXELS => {
+                Err(format!(
+                    "render.size_px must have at most {MAX_PIXELS} pixels (3840 x 2160): {width} x {height}"
+                ))
             }
+            _ => Ok(()),
         }
-        if let Some([width, height]) = self.size_px
-            && u64::from(width) * u64::from(height) > MOST_PIXELS
-        {
-            return Err(format!(
-                "render.size_px must have at most {MOST_PIXELS} pixels (3840 x 2160): {width} x {height}"
-            ));
-        }
-        for (name, value) in [
-            ("render.haze_per_bl", self.haze_per_bl),
-            ("render.shadow", self.shadow.unwrap_or(0.0)),
-        ] {
-            if !(0.0..=1.0).contains(&value) {
-                return Err(format!("{name} must lie in 0..=1: {value}"));
-            }
-        }
-        Ok(())
     }
 }
 
@@ -179,27 +165,16 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_range_is_named() {
-        let huge = Render {
-            size_px: Some([9000, 100]),
-            ..Render::default()
+    fn number_of_pixels_is_limited() {
+        let check = |size_px| {
+            let size_px = Some(size_px);
+            let render = Render {
+                size_px,
+                ..Render::default()
+            };
+            render.check_combinations()
         };
-        assert!(huge.check().unwrap_err().contains("render.size_px"));
-        let vast = Render {
-            size_px: Some([8192, 8192]),
-            ..Render::default()
-        };
-        assert!(vast.check().unwrap_err().contains("8294400"));
-        let long = Render {
-            size_px: Some([8192, 1012]),
-            ..Render::default()
-        };
-        assert_eq!(long.check(), Ok(()));
-        let dark = Render {
-            shadow: Some(f64::NAN),
-            ..Render::default()
-        };
-        assert!(dark.check().unwrap_err().contains("render.shadow"));
-        assert_eq!(Render::default().check(), Ok(()));
+        assert!(check([8192, 8192]).unwrap_err().contains("8294400"));
+        assert_eq!(check([8192, 1012]), Ok(()));
     }
 }

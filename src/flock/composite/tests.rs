@@ -7,6 +7,7 @@ use crate::flock::Fade;
 use crate::flock::synthetic;
 use crate::flock::{Params, plan_flock};
 use crate::library::View;
+use crate::parameters::Parameters;
 use crate::progress::Silent;
 use crate::raster::RgbaImage;
 

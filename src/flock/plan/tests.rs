@@ -9,6 +9,7 @@ use crate::flock::synthetic;
 use crate::flock::{Flock, plan_flock};
 use crate::geometry::Turns;
 use crate::library::View;
+use crate::parameters::Parameters;
 use crate::progress::Silent;
 
 /// Returns a flock of the named preset. `direction` and `position` are a school matched by that criterion.

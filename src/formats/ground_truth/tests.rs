@@ -7,6 +7,7 @@ use crate::flock::{Compositor, Params, Shot, plan_flock, synthetic};
 use crate::formats::picture;
 use crate::geometry::Rect;
 use crate::library::View;
+use crate::parameters::Parameters;
 use crate::progress::Silent;
 
 const N_FRAMES: usize = 30;

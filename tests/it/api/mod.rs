@@ -15,6 +15,7 @@ mod limits;
 mod metrics;
 mod names;
 mod one_call;
+mod parameters;
 mod uploads;
 mod wait;
 mod walls;

@@ -1,7 +1,16 @@
 //! Table of allowed imports, and the reader that finds the imports of a file.
 
 pub(super) const VALUES: &[&str] = &[
-    "geometry", "raster", "random", "cpu", "progress", "code", "ids", "scratch", "order",
+    "geometry",
+    "raster",
+    "random",
+    "cpu",
+    "progress",
+    "code",
+    "ids",
+    "scratch",
+    "order",
+    "parameters",
 ];
 pub(super) const MIDDLE: &[&str] = &["library", "footage"];
 pub(super) const ALGORITHMS: &[&str] = &["analysis", "flock", "fish"];
