@@ -47,7 +47,7 @@ use self::plan::{Model, Plan, Planner};
 use crate::geometry::rounded;
 use crate::library::Library;
 use crate::parameters::Parameters;
-use crate::progress::{Progress, Quiet};
+use crate::progress::{CancelOnly, Progress};
 
 /// A simulated, planned and placed flock, without its pixels.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use crate::cli::sample::parse_size;
-use crate::cli::{Error, set};
+use crate::cli::{Error, extension, set};
 use crate::flock::Params;
 use crate::flock::composite::params::{Background, Format, Render};
 use crate::jobs::flock::film::{Backdrop, Output, Target};
