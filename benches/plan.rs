@@ -18,7 +18,7 @@ use flockreel::flock::{BoidTrack, Params, Stats, plan_flock};
 use flockreel::formats::library_dir;
 use flockreel::library::{Jump, Library, LibraryStats, Playback, Pose, Poses, Sprites, View};
 use flockreel::progress::Silent;
-use flockreel::random::unit;
+use flockreel::random::uniform;
 use flockreel::raster::RgbImage;
 use flockreel::scratch::InMemory;
 
@@ -163,16 +163,16 @@ fn made_library(n_frames: u32) -> Library {
 }
 
 fn made_jumps(n_frames: u32, heading: impl Fn(u32) -> f64) -> Vec<Jump> {
-    let frame = |draw: u64, which: u64| (unit(5, &[which, draw]) * f64::from(n_frames)) as u32;
+    let frame = |draw: u64, which: u64| (uniform(5, &[which, draw]) * f64::from(n_frames)) as u32;
     let jump = |draw: u64| {
         let (from, to) = (frame(draw, 1), frame(draw, 2));
-        let mirrored = unit(5, &[3, draw]) < 0.5;
+        let mirrored = uniform(5, &[3, draw]) < 0.5;
         let meant = match mirrored {
             true => std::f64::consts::PI - heading(to),
             false => heading(to),
         };
         let alike = (heading(from) - meant).cos() > 0.97 && from.abs_diff(to) > 15;
-        let cost = 500 + (unit(5, &[4, draw]) * 499.0) as u64;
+        let cost = 500 + (uniform(5, &[4, draw]) * 499.0) as u64;
         alike.then_some(Jump {
             from,
             to,
