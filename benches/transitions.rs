@@ -113,10 +113,10 @@ fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads
             mirror: k == 1,
             ..params.clone()
         };
-        let of = (&library.sprites, &library.poses);
         times.search_s[k] = best(&mut || {
+            let (sprites, poses, cpu) = (&library.sprites, &library.poses, Level::detect());
             let search =
-                || transition::connect_compared(pixels, of, &params, Level::detect(), &Silent);
+                || transition::connect_compared(pixels, sprites, poses, &params, cpu, &Silent);
             let found = pool.install(search).expect("nobody cancels");
             times.n_candidates = found.n_candidates;
             times.n_transitions = found.transitions.len();

@@ -10,7 +10,7 @@
 //! shows the minimum of its pairs, so that a single similar pair stays visible.
 
 use super::picture;
-use crate::analysis::distance::{Cancelled, ClipPair, Distances, Everything};
+use crate::analysis::distance::{AllPairs, Cancelled, ClipPair, Distances};
 use crate::library::{Library, Sprites};
 use crate::progress::Progress;
 
@@ -63,7 +63,7 @@ impl DistanceMap {
             true => {
                 let limit = library.epsilon.saturating_mul(FAR);
                 let near = |_: usize, pairs: &[ClipPair]| pairs.iter().copied().for_each(&mut pool);
-                distances.for_each_row_below(limit, &Everything, progress, near)?
+                distances.for_each_row_below(limit, &AllPairs, progress, near)?
             }
         }
         map.mirror_triangle();

@@ -45,16 +45,18 @@ impl Marks {
     /// Marks every entry.
     pub fn mark_all(&mut self) {
         self.words.fill(u64::MAX);
-        self.trim();
+        self.clear_padding();
     }
 
-    /// Marks each entry k for which `such(values[k])` is true.
-    pub fn mark_where<T>(&mut self, values: &[T], such: impl Fn(&T) -> bool) {
+    /// Marks each entry k for which `predicate(values[k])` is true.
+    pub fn mark_where<T>(&mut self, values: &[T], predicate: impl Fn(&T) -> bool) {
         for (word, values) in self.words.iter_mut().zip(values.chunks(WORD)) {
             let bits = (0..).zip(values);
-            *word |= bits.fold(0, |bits, (k, value)| bits | u64::from(such(value)) << k);
+            *word |= bits.fold(0, |bits, (k, value)| {
+                bits | u64::from(predicate(value)) << k
+            });
         }
-        self.trim();
+        self.clear_padding();
     }
 
     /// Unmarks entry `k`.
@@ -72,24 +74,24 @@ impl Marks {
     }
 
     /// Keeps only the marks of entries k for which entry k + `by` of `other` is marked.
-    pub fn keep(&mut self, other: &Marks, by: usize) {
+    pub fn intersect(&mut self, other: &Marks, by: usize) {
         for (word, at) in self.words.iter_mut().zip((by as isize..).step_by(WORD)) {
             *word &= other.bits(at);
         }
     }
 
     /// Unmarks the entries that are marked in `other`.
-    pub fn drop(&mut self, other: &Marks) {
+    pub fn subtract(&mut self, other: &Marks) {
         let both = self.words.iter_mut().zip(&other.words);
         both.for_each(|(word, other)| *word &= !other);
     }
 
     /// Marks also the entries k for which entry k + `by` of `other` is marked.
-    pub fn add(&mut self, other: &Marks, by: isize) {
+    pub fn union(&mut self, other: &Marks, by: isize) {
         for (word, at) in self.words.iter_mut().zip((by..).step_by(WORD)) {
             *word |= other.bits(at);
         }
-        self.trim();
+        self.clear_padding();
     }
 
     /// Returns 64 entries from `at` on, the first in the lowest bit. Entries that do not exist are 0.
@@ -149,7 +151,7 @@ impl Marks {
         at.min(self.n)
     }
 
-    fn trim(&mut self) {
+    fn clear_padding(&mut self) {
         if let (Some(last), tail @ 1..) = (self.words.last_mut(), self.n % WORD) {
             *last &= !(u64::MAX << tail);
         }
@@ -198,13 +200,13 @@ mod tests {
             let each = |entry: &dyn Fn(usize) -> bool| (0..a.len()).map(entry).collect::<Vec<_>>();
 
             let mut added = row.clone();
-            added.add(&marks(&b), by);
+            added.union(&marks(&b), by);
             prop_assert_eq!(marked(&added), each(&|k| a[k] || of_b(k as isize + by)));
             let mut kept = row.clone();
-            kept.keep(&marks(&b), by.unsigned_abs());
+            kept.intersect(&marks(&b), by.unsigned_abs());
             prop_assert_eq!(marked(&kept), each(&|k| a[k] && of_b(k as isize + by.abs())));
             let mut dropped = row.clone();
-            dropped.drop(&marks(&b));
+            dropped.subtract(&marks(&b));
             prop_assert_eq!(marked(&dropped), each(&|k| a[k] && !of_b(k as isize)));
             let mut cut = row.clone();
             cut.unmark_first(by.unsigned_abs());

@@ -8,8 +8,8 @@
 use std::cmp::Ordering;
 
 /// Radius of the neighborhood in each clip, clips. Free choice.
-pub(super) const REACH: usize = 2;
-const N_ROWS: usize = 2 * REACH + 1;
+pub(super) const RADIUS: usize = 2;
+const N_ROWS: usize = 2 * RADIUS + 1;
 
 /// A pair of clips, `from <= to`, and its distance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -25,7 +25,7 @@ pub struct ClipPair {
 /// Finds the local minima below a limit in a stream of rows.
 pub struct LocalMinima<'a> {
     usable: &'a [bool],
-    least_gap: usize,
+    min_gap: usize,
     limit: u64,
     rows: [Row; N_ROWS],
     n_rows: usize,
@@ -40,12 +40,12 @@ struct Row {
 }
 
 impl LocalMinima<'_> {
-    /// Starts a search among pairs of `usable` clips at least `least_gap` apart. Only D < `limit` is
+    /// Starts a search among pairs of `usable` clips at least `min_gap` apart. Only D < `limit` is
     /// reported.
-    pub fn new(usable: &[bool], least_gap: usize, limit: u64) -> LocalMinima<'_> {
+    pub fn new(usable: &[bool], min_gap: usize, limit: u64) -> LocalMinima<'_> {
         LocalMinima {
             usable,
-            least_gap,
+            min_gap,
             limit,
             rows: Default::default(),
             n_rows: 0,
@@ -57,31 +57,31 @@ impl LocalMinima<'_> {
     pub fn push(&mut self, pairs: &[ClipPair], on_minimum: impl FnMut(ClipPair)) {
         let i = self.n_rows;
         let competes = |pair: &&ClipPair| {
-            self.usable[i] && self.usable[pair.to] && pair.to - i >= self.least_gap
+            self.usable[i] && self.usable[pair.to] && pair.to - i >= self.min_gap
         };
         let pairs = pairs.iter().filter(competes).copied();
         self.rows[i % N_ROWS].fill(self.usable.len() - i, pairs);
         self.n_rows += 1;
-        if let Some(settled) = i.checked_sub(REACH) {
+        if let Some(settled) = i.checked_sub(RADIUS) {
             self.report(settled, on_minimum);
         }
     }
 
     /// Reports the minima of the last rows.
     pub fn finish(self, mut on_minimum: impl FnMut(ClipPair)) {
-        for i in self.n_rows.saturating_sub(REACH)..self.n_rows {
+        for i in self.n_rows.saturating_sub(RADIUS)..self.n_rows {
             self.report(i, &mut on_minimum);
         }
     }
 
     fn report(&self, from: usize, on_minimum: impl FnMut(ClipPair)) {
-        let below = self.rows[from % N_ROWS].pairs.iter().copied();
-        let minima = below.filter(|&pair| pair.distance < self.limit && self.is_minimum(pair));
+        let pairs = self.rows[from % N_ROWS].pairs.iter().copied();
+        let minima = pairs.filter(|&pair| pair.distance < self.limit && self.is_minimum(pair));
         minima.for_each(on_minimum);
     }
 
     fn is_minimum(&self, pair: ClipPair) -> bool {
-        let around = |center: usize| center.saturating_sub(REACH)..=center + REACH;
+        let around = |center: usize| center.saturating_sub(RADIUS)..=center + RADIUS;
         around(pair.from).all(|a| {
             around(pair.to).all(|b| {
                 self.distance(a, b)
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn the_best_pair_around_a_moment_is_kept_alone() {
+    fn only_the_best_pair_around_a_moment_is_kept() {
         let rows: [&[u64]; 8] = [
             &[0, 9, 9, 9, 9, 9, 5, 9],
             &[0, 9, 9, 9, 9, 4, 5],

@@ -6,26 +6,25 @@
 //! symmetric, so only j >= i is computed. The rows are streamed in order, in panels of 4 x 48 rows. The N x N
 //! matrix is never held.
 
-mod asked;
 mod bounds;
 mod group;
 mod kernel;
 mod marks;
 mod matrix;
 mod minima;
-mod page;
+mod pair_filter;
 mod pixels;
 mod pruned;
-mod upright;
+mod rotation;
 mod window;
 
 #[cfg(test)]
 pub(crate) mod tests;
 
-pub use asked::{Asked, Everything};
 pub use marks::Marks;
 pub use matrix::DistanceMatrix;
 pub use minima::{ClipPair, LocalMinima};
+pub use pair_filter::{AllPairs, PairFilter};
 pub use pixels::ComparedSprites;
 pub use window::Clip;
 
@@ -33,12 +32,12 @@ use rayon::prelude::*;
 
 use crate::cpu::Level;
 use crate::progress::Progress;
-use group::{GROUP, Group, GroupMemory};
+use group::{GROUP, Group, GroupBuffer};
 use kernel::Tile;
 use window::WindowSums;
 
 /// Number of row groups in a panel. Each loaded column group serves this many tiles. Free choice.
-const PANEL: usize = 4;
+const PANEL_GROUPS: usize = 4;
 
 /// The version of clip j that is compared with clip i.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,8 +83,8 @@ impl Distances<'_> {
         let n_frames = self.pixels.n_frames();
         let mut window = WindowSums::new(self.clip, n_frames);
         let mut row: Vec<u64> = Vec::with_capacity(n_frames);
-        let mut memory = <[GroupMemory; PANEL]>::default();
-        for panel_idx in (0..self.pixels.n_groups()).step_by(PANEL) {
+        let mut buffers = <[GroupBuffer; PANEL_GROUPS]>::default();
+        for panel_idx in (0..self.pixels.n_groups()).step_by(PANEL_GROUPS) {
             if progress.cancelled() {
                 return Err(Cancelled);
             }
@@ -93,12 +92,12 @@ impl Distances<'_> {
             // The remaining work is a triangle, so it shrinks with the square of the remaining rows.
             let rest = 1.0 - first as f64 / n_frames as f64;
             progress.report("distances", 1.0 - rest * rest);
-            let tiles = self.panel(panel_idx, &mut memory);
-            for r in first..n_frames.min(first + PANEL * GROUP) {
+            let tiles = self.panel(panel_idx, &mut buffers);
+            for r in first..n_frames.min(first + PANEL_GROUPS * GROUP) {
                 let (group, line) = ((r - first) / GROUP, (r - first) % GROUP);
-                let of_tiles = tiles[group..].iter().flat_map(|column| column[group][line]);
+                let sprite_sads = tiles[group..].iter().flat_map(|column| column[group][line]);
                 row.clear();
-                row.extend(of_tiles.skip(line).take(n_frames - r));
+                row.extend(sprite_sads.skip(line).take(n_frames - r));
                 if let Some(sums) = window.push(&row) {
                     on_row(r + 1 - self.clip.frames, sums);
                 }
@@ -113,22 +112,23 @@ impl Distances<'_> {
     fn panel(
         &self,
         first: usize,
-        memory: &mut [GroupMemory; PANEL],
+        buffers: &mut [GroupBuffer; PANEL_GROUPS],
     ) -> Vec<Vec<Box<kernel::SadTile>>> {
         let n_groups = self.pixels.n_groups();
-        let rows: Vec<Group<'_>> = (first..n_groups.min(first + PANEL))
-            .zip(memory)
-            .map(|(group_idx, memory)| self.row_group(group_idx, memory))
+        let rows: Vec<Group<'_>> = (first..n_groups.min(first + PANEL_GROUPS))
+            .zip(buffers)
+            .map(|(group_idx, buffer)| self.row_group(group_idx, buffer))
             .collect();
         (first..n_groups)
             .into_par_iter()
-            .map_init(GroupMemory::default, |memory, column_idx| {
-                let columns = self.pixels.group(column_idx, memory);
+            .map_init(GroupBuffer::default, |buffer, column_idx| {
+                let columns = self.pixels.group(column_idx, buffer);
                 let above = &rows[..rows.len().min(column_idx + 1 - first)];
                 let tile = |(row_idx, &rows)| {
-                    let wanted = match column_idx == row_idx {
-                        true => kernel::upper(rows, columns),
-                        false => kernel::all(rows, columns),
+                    let wanted = if column_idx == row_idx {
+                        kernel::upper_triangle(rows, columns)
+                    } else {
+                        kernel::all_pairs(rows, columns)
                     };
                     let tile = Tile {
                         rows,
@@ -143,10 +143,10 @@ impl Distances<'_> {
     }
 
     /// Returns a group of rows, mirrored if the distances are.
-    fn row_group<'b>(&'b self, group_idx: usize, memory: &'b mut GroupMemory) -> Group<'b> {
+    fn row_group<'b>(&'b self, group_idx: usize, buffer: &'b mut GroupBuffer) -> Group<'b> {
         match self.side {
-            Side::Plain => self.pixels.group(group_idx, memory),
-            Side::Mirrored => self.pixels.mirrored_group(group_idx, memory),
+            Side::Plain => self.pixels.group(group_idx, buffer),
+            Side::Mirrored => self.pixels.mirrored_group(group_idx, buffer),
         }
     }
 }

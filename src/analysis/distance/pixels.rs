@@ -12,26 +12,24 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::Side;
-use super::bounds::{Bounds, Sums};
-use super::group::{GROUP, Group, GroupMemory, SIDE};
-use super::kernel::{Tile, sad_tile};
-use super::page::{Flip, Page};
-use super::upright::Canvas;
+use super::bounds::{Bounds, SpriteSums};
+use super::group::{BlockGrid, GROUP, Group, GroupBuffer, SpilledGroup};
+use super::kernel::{Tile, Wanted, sad_tile};
+use super::rotation::Canvas;
 use crate::analysis::params::Planes;
 use crate::cpu::Level;
 use crate::library::{Poses, Sprites, View};
 use crate::scratch::{Full, Scratch};
 
 /// Size of the blocks that stay in memory, bytes. The rest goes to the temporary storage. Free choice.
-const HELD_BYTES: usize = 64 << 20;
+const MEMORY_BYTES: usize = 64 << 20;
 
 /// The U of all frames.
 pub struct ComparedSprites {
     n_frames: usize,
-    width: usize,
-    height: usize,
-    flip: Flip,
-    groups: Vec<Stored>,
+    grid: BlockGrid,
+    mirror_axis: MirrorAxis,
+    groups: Vec<StoredGroup>,
     /// Bounds of the unmirrored sprites.
     plain: Bounds,
     /// Bounds of the mirrored sprites.
@@ -40,13 +38,9 @@ pub struct ComparedSprites {
 }
 
 /// Storage of a group.
-enum Stored {
-    Held(GroupMemory),
-    /// The sums, and the offset of the blocks that are not blank in the temporary storage.
-    Aside {
-        sums: Vec<u32>,
-        at: u64,
-    },
+enum StoredGroup {
+    InMemory(GroupBuffer),
+    Spilled(SpilledGroup),
 }
 
 impl ComparedSprites {
@@ -55,33 +49,28 @@ impl ComparedSprites {
     /// Missing sprites are blank. In top view, sprites of unknown heading are blank too. Fails when the
     /// temporary storage is full.
     pub fn new(sprites: &Sprites, poses: &Poses, planes: Planes) -> Result<Self, Full> {
-        ComparedSprites::holding(HELD_BYTES, sprites, poses, planes)
+        ComparedSprites::with_memory(MEMORY_BYTES, sprites, poses, planes)
     }
 
-    /// Works like `new`, but keeps at most `held_bytes` of blocks in memory.
-    pub(super) fn holding(
-        held_bytes: usize,
+    /// Works like `new`, but keeps at most `memory_bytes` of blocks in memory.
+    pub(super) fn with_memory(
+        memory_bytes: usize,
         sprites: &Sprites,
         poses: &Poses,
         planes: Planes,
     ) -> Result<Self, Full> {
-        let canvas = match poses.view {
-            View::Side => None,
-            View::Top => Some(Canvas::around(sprites, poses)),
+        let (canvas, mirror_axis) = match poses.view {
+            View::Side => (None, MirrorAxis::Vertical),
+            View::Top => (Some(Canvas::new(sprites, poses)), MirrorAxis::Horizontal),
         };
-        let (width, height, flip) = match &canvas {
-            None => (
-                sprites.width() as usize,
-                sprites.height() as usize,
-                Flip::Columns,
-            ),
-            Some(canvas) => (canvas.width, canvas.height, Flip::Rows),
+        let (width, height) = match &canvas {
+            None => (sprites.width() as usize, sprites.height() as usize),
+            Some(canvas) => (canvas.width, canvas.height),
         };
         let mut compared = ComparedSprites {
             n_frames: sprites.n_frames(),
-            width,
-            height,
-            flip,
+            grid: BlockGrid { width, height },
+            mirror_axis,
             groups: Vec::new(),
             plain: Bounds::default(),
             mirrored: Bounds::default(),
@@ -89,47 +78,48 @@ impl ComparedSprites {
         };
         let n_groups = compared.n_frames.div_ceil(GROUP);
         // Thread timing decides which groups stay in memory. The distances do not depend on it.
-        let n_held = AtomicUsize::new(0);
+        let n_bytes = AtomicUsize::new(0);
         let source = Source {
             sprites,
             poses,
             planes,
             canvas: canvas.as_ref(),
         };
-        let gathered = (0..n_groups)
+        let built = (0..n_groups)
             .into_par_iter()
             .map(|group_idx| {
-                let (group, sums) = compared.gathered(group_idx, &source);
-                let n_before = n_held.fetch_add(group.n_bytes(), Ordering::Relaxed);
-                let stored = match n_before + group.n_bytes() <= held_bytes {
-                    true => Stored::Held(group.hold()),
-                    false => {
-                        let (sums, at) = group.put_aside(&*compared.scratch)?;
-                        Stored::Aside { sums, at }
-                    }
+                let (group, sums) = compared.build_group(group_idx, &source);
+                let n_before = n_bytes.fetch_add(group.n_bytes(), Ordering::Relaxed);
+                let stored = if n_before + group.n_bytes() <= memory_bytes {
+                    StoredGroup::InMemory(group.shrunk())
+                } else {
+                    StoredGroup::Spilled(group.spill(&*compared.scratch)?)
                 };
                 Ok((stored, sums))
             })
             .collect::<Result<Vec<_>, Full>>()?;
-        let (groups, sums): (Vec<_>, Vec<_>) = gathered.into_iter().unzip();
+        let (groups, sums): (Vec<_>, Vec<_>) = built.into_iter().unzip();
         let (plain, mirrored): (Vec<_>, Vec<_>) = sums.into_iter().flatten().unzip();
         compared.groups = groups;
-        compared.plain = Bounds::of(&plain);
-        compared.mirrored = Bounds::of(&mirrored);
+        compared.plain = Bounds::new(&plain);
+        compared.mirrored = Bounds::new(&mirrored);
         Ok(compared)
     }
 
     /// Returns the blocks of one group, and the square sums of each sprite, plain and mirrored.
-    fn gathered(&self, group_idx: usize, source: &Source<'_>) -> (GroupMemory, Vec<(Sums, Sums)>) {
-        let mut group = GroupMemory::default();
-        let mut bytes = vec![0; self.n_bytes()];
+    fn build_group(
+        &self,
+        group_idx: usize,
+        source: &Source<'_>,
+    ) -> (GroupBuffer, Vec<(SpriteSums, SpriteSums)>) {
+        let mut group = GroupBuffer::default();
         let mut sums = Vec::with_capacity(GROUP);
-        let size = [self.n_sprites(group_idx), self.n_blocks()];
-        group.take_in(size, &mut self.page(), |sprite, page| {
-            source.draw(group_idx * GROUP + sprite, &mut bytes);
-            page.draw(&bytes);
-            let mirrored = Sums::of_mirrored(&bytes, self.width, self.flip);
-            sums.push((Sums::of(&bytes, self.width), mirrored));
+        group.fill(self.n_sprites(group_idx), self.grid, |sprite, bytes| {
+            source.draw(group_idx * GROUP + sprite, bytes);
+            let mut mirrored = bytes.to_vec();
+            self.mirror_axis.mirror(&mut mirrored, self.grid.width);
+            let of_sprite = |bytes: &[u8]| SpriteSums::new(bytes, self.grid.width);
+            sums.push((of_sprite(bytes), of_sprite(&mirrored)));
         });
         (group, sums)
     }
@@ -141,36 +131,29 @@ impl ComparedSprites {
 
     /// Returns the number of bytes compared per pair of sprites.
     pub fn n_bytes(&self) -> usize {
-        self.width * self.height * 4
+        self.grid.n_bytes()
     }
 
     /// Returns d(i, i + 1) for every frame but the last.
     pub fn steps(&self, cpu: Level) -> Vec<u64> {
         let of_group = |group_idx: usize| {
-            let (mut one, mut other) = (GroupMemory::default(), GroupMemory::default());
-            let group = self.group(group_idx, &mut one);
-            let wanted = std::array::from_fn(|k| (k + 1 < group.n_sprites).then_some(2 << k));
-            let wanted = wanted.map(Option::unwrap_or_default);
-            let within = sad_tile(
-                cpu,
-                Tile {
-                    rows: group,
-                    columns: group,
+            let (mut buffer, mut next_buffer) = (GroupBuffer::default(), GroupBuffer::default());
+            let rows = self.group(group_idx, &mut buffer);
+            let tile = |columns: Group<'_>, wanted: Wanted| {
+                let tile = Tile {
+                    rows,
+                    columns,
                     wanted: &wanted,
-                },
-            );
-            let mut steps: Vec<u64> = (1..group.n_sprites).map(|k| within[k - 1][k]).collect();
+                };
+                sad_tile(cpu, tile)
+            };
+            let next_sprite = |k: usize| if k + 1 < rows.n_sprites { 2 << k } else { 0 };
+            let within = tile(rows, std::array::from_fn(next_sprite));
+            let mut steps: Vec<u64> = (1..rows.n_sprites).map(|k| within[k - 1][k]).collect();
             if group_idx + 1 < self.n_groups() {
-                let columns = self.group(group_idx + 1, &mut other);
-                let wanted = std::array::from_fn(|k| u64::from(k + 1 == GROUP));
-                let across = sad_tile(
-                    cpu,
-                    Tile {
-                        rows: group,
-                        columns,
-                        wanted: &wanted,
-                    },
-                );
+                let columns = self.group(group_idx + 1, &mut next_buffer);
+                let last_and_first = |k: usize| u64::from(k + 1 == GROUP);
+                let across = tile(columns, std::array::from_fn(last_and_first));
                 steps.push(across[GROUP - 1][0]);
             }
             steps
@@ -191,43 +174,58 @@ impl ComparedSprites {
         self.groups.len()
     }
 
-    /// Returns a group. If it is in the temporary storage, it is read into `memory`.
-    pub(super) fn group<'a>(&'a self, group_idx: usize, memory: &'a mut GroupMemory) -> Group<'a> {
+    /// Returns a group. If it is in the temporary storage, it is read into `buffer`.
+    pub(super) fn group<'a>(&'a self, group_idx: usize, buffer: &'a mut GroupBuffer) -> Group<'a> {
         let n_sprites = self.n_sprites(group_idx);
         match &self.groups[group_idx] {
-            Stored::Held(group) => group.lend(n_sprites),
-            Stored::Aside { sums, at } => {
-                memory.have_back(sums, *at, &*self.scratch);
-                memory.lend(n_sprites)
+            StoredGroup::InMemory(group) => group.as_group(n_sprites),
+            StoredGroup::Spilled(spilled) => {
+                buffer.load(spilled, &*self.scratch);
+                buffer.as_group(n_sprites)
             }
         }
     }
 
-    /// Returns a group mirrored, in `memory`.
+    /// Returns a group mirrored, in `buffer`.
     pub(super) fn mirrored_group<'a>(
         &self,
         group_idx: usize,
-        memory: &'a mut GroupMemory,
+        buffer: &'a mut GroupBuffer,
     ) -> Group<'a> {
-        let mut aside = GroupMemory::default();
-        let group = self.group(group_idx, &mut aside);
-        let size = [group.n_sprites, self.n_blocks()];
-        memory.take_in(size, &mut self.page(), |sprite, page| {
-            page.draw_mirrored(group, sprite, self.flip);
+        let mut plain_buffer = GroupBuffer::default();
+        let group = self.group(group_idx, &mut plain_buffer);
+        buffer.fill(group.n_sprites, self.grid, |sprite, bytes| {
+            group.copy_sprite(sprite, self.grid, bytes);
+            self.mirror_axis.mirror(bytes, self.grid.width);
         });
-        memory.lend(group.n_sprites)
+        buffer.as_group(group.n_sprites)
     }
 
     fn n_sprites(&self, group_idx: usize) -> usize {
         (self.n_frames - group_idx * GROUP).min(GROUP)
     }
+}
 
-    fn page(&self) -> Page {
-        Page::new([self.width, self.height])
-    }
+/// The axis across which sprites are mirrored.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum MirrorAxis {
+    /// Left-right mirroring, in side view.
+    Vertical,
+    /// Mirroring across the body axis of an animal that heads along +x, in top view.
+    Horizontal,
+}
 
-    fn n_blocks(&self) -> usize {
-        self.width.div_ceil(SIDE) * self.height.div_ceil(SIDE)
+impl MirrorAxis {
+    /// Mirrors a sprite with four bytes per pixel and `width` pixels per row.
+    fn mirror(self, bytes: &mut [u8], width: usize) {
+        let pixels = bytes.as_chunks_mut::<4>().0;
+        if self == MirrorAxis::Horizontal {
+            // This reverses both directions; the rows are then reversed back.
+            pixels.reverse();
+        }
+        pixels
+            .chunks_exact_mut(width.max(1))
+            .for_each(<[_]>::reverse);
     }
 }
 
@@ -248,7 +246,7 @@ impl Source<'_> {
             Some(canvas) => {
                 let mut plain = vec![0; sprite.len()];
                 premultiply(&sprite, self.planes, &mut plain);
-                canvas.turn(&plain, self.poses.frames[frame_idx].heading_rad, bytes);
+                canvas.rotate(&plain, self.poses.frames[frame_idx].heading_rad, bytes);
             }
         }
     }

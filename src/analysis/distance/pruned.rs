@@ -1,7 +1,7 @@
 //! Computes only the distances below a limit, and skips most others
 //! (docs/explanation/algorithms.md, "Distances").
 //!
-//! For the needed pairs of a panel (see `asked`), bounds from 16 x 16 squares come first. Pairs with a bound
+//! For the needed pairs of a panel (see `pair_filter`), bounds from 16 x 16 squares come first. Pairs with a bound
 //! below the limit get bounds from 8 x 8 squares. Pairs that remain, and their competitors, get exact
 //! distances. A needed pair is skipped only if a bound proves that its distance is not below the limit.
 //!
@@ -11,11 +11,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::asked::{self, Asked};
 use super::bounds::SquareSums;
-use super::group::{GROUP, Group, GroupMemory};
+use super::group::{GROUP, Group, GroupBuffer};
 use super::kernel::{self, SadTile, Tile, Wanted};
 use super::marks::Marks;
+use super::pair_filter::{self, PairFilter};
 use super::{Cancelled, ClipPair, Distances, Side};
 use crate::progress::Progress;
 
@@ -25,7 +25,7 @@ const PANEL_BYTES: usize = 128 << 20;
 /// Memory per pair of frames, bytes: its bound and its entry in a tile.
 const PAIR_BYTES: usize = size_of::<u32>() + size_of::<u64>();
 /// Largest number of groups in a panel. Tests use 1, so that their short films have several panels.
-const MOST_GROUPS: usize = if cfg!(test) { 1 } else { 8 };
+const MAX_GROUPS: usize = if cfg!(test) { 1 } else { 8 };
 
 impl Distances<'_> {
     /// Calls `on_row(i, pairs)` for every clip i in order. The pairs (i, j) have D(i, j) < `limit` and
@@ -35,13 +35,13 @@ impl Distances<'_> {
     pub fn for_each_row_below(
         &self,
         limit: u64,
-        asked: &impl Asked,
+        filter: &impl PairFilter,
         progress: &dyn Progress,
         mut on_row: impl FnMut(usize, &[ClipPair]),
     ) -> Result<(), Cancelled> {
         let (n_frames, n_clips) = (self.pixels.n_frames(), self.n_clips());
         let n_groups = PANEL_BYTES / (GROUP * n_frames.max(1) * PAIR_BYTES);
-        let n_rows = GROUP * n_groups.clamp(1, MOST_GROUPS);
+        let n_rows = GROUP * n_groups.clamp(1, MAX_GROUPS);
         let mut panel = Panel::new(self, limit);
         for first in (0..n_clips).step_by(n_rows) {
             if progress.cancelled() {
@@ -50,7 +50,7 @@ impl Distances<'_> {
             let rest = 1.0 - first as f64 / n_frames as f64;
             progress.report("distances", 1.0 - rest * rest);
             let clips = first..n_clips.min(first + n_rows);
-            for (i, pairs) in clips.clone().zip(panel.pairs(clips, asked)) {
+            for (i, pairs) in clips.clone().zip(panel.pairs(clips, filter)) {
                 on_row(i, &pairs);
             }
         }
@@ -65,105 +65,108 @@ struct Panel<'a> {
     limit: u64,
     weights: Vec<u64>,
     /// Largest stored bound. Small enough that weighted sums fit 32 bits; up to the limit where possible.
-    most: u32,
+    max_bound: u32,
     /// The first clip.
     first: usize,
     /// Lower bounds of d by frame of these clips and by offset; valid only where computed.
-    least: Vec<Vec<u32>>,
+    bounds: Vec<Vec<u32>>,
     /// Buffers for the row groups.
-    memory: Vec<GroupMemory>,
+    buffers: Vec<GroupBuffer>,
 }
 
 impl<'a> Panel<'a> {
     fn new(distances: &'a Distances<'a>, limit: u64) -> Panel<'a> {
         let weights = distances.clip.weights();
-        let most = u64::from(u32::MAX) / weights.iter().sum::<u64>();
+        let max_bound = u64::from(u32::MAX) / weights.iter().sum::<u64>();
         Panel {
             distances,
             limit,
-            most: most.min(limit) as u32,
+            max_bound: max_bound.min(limit) as u32,
             weights,
             first: 0,
-            least: Vec::new(),
-            memory: Vec::new(),
+            bounds: Vec::new(),
+            buffers: Vec::new(),
         }
     }
 
     /// Returns the pairs below the limit for each of the clips, ascending.
-    fn pairs(&mut self, clips: Range<usize>, asked: &impl Asked) -> Vec<Vec<ClipPair>> {
-        let (reach, n_clips) = (asked.reach(), self.distances.n_clips());
+    fn pairs(&mut self, clips: Range<usize>, filter: &impl PairFilter) -> Vec<Vec<ClipPair>> {
+        let (radius, n_clips) = (filter.radius(), self.distances.n_clips());
         // Pairs of earlier or later clips may have competitors among these clips.
-        let around = clips.start.saturating_sub(reach)..n_clips.min(clips.end + reach);
-        let ask = |i: usize| {
+        let with_margin = clips.start.saturating_sub(radius)..n_clips.min(clips.end + radius);
+        let request = |i: usize| {
             let mut row = Marks::none(n_clips - i);
-            asked.mark(i, &mut row);
+            filter.mark(i, &mut row);
             row
         };
-        let asked: Vec<Marks> = around.clone().into_par_iter().map(ask).collect();
-        self.begin_at(around.clone());
+        let requested: Vec<Marks> = with_margin.clone().into_par_iter().map(request).collect();
+        self.reset(with_margin.clone());
         let pixels = self.distances.pixels;
         let [rows, columns] = [self.distances.side, Side::Plain].map(|side| pixels.bounds(side));
-        let mut near = asked.clone();
-        self.drop_far(&mut near, &rows.coarse, &columns.coarse);
-        self.drop_far(&mut near, &rows.fine, &columns.fine);
-        let mut competing = asked::competing(&near, &asked, reach);
-        self.drop_far(&mut competing, &rows.fine, &columns.fine);
-        let both = near.iter_mut().zip(&competing);
-        both.for_each(|(near, competing)| near.add(competing, 0));
-        self.exact(
+        let mut candidates = requested.clone();
+        self.prune(&mut candidates, &rows.coarse, &columns.coarse);
+        self.prune(&mut candidates, &rows.fine, &columns.fine);
+        let mut neighbors = pair_filter::neighbors(&candidates, &requested, radius);
+        self.prune(&mut neighbors, &rows.fine, &columns.fine);
+        let each_clip = candidates.iter_mut().zip(&neighbors);
+        each_clip.for_each(|(candidates, neighbors)| candidates.union(neighbors, 0));
+        self.exact_pairs(
             clips.start,
-            &near[clips.start - around.start..][..clips.len()],
+            &candidates[clips.start - with_margin.start..][..clips.len()],
         )
     }
 
-    fn begin_at(&mut self, clips: Range<usize>) {
+    fn reset(&mut self, clips: Range<usize>) {
         let frames = clips.start..clips.end + self.distances.clip.frames - 1;
         let n_frames = self.distances.pixels.n_frames();
         self.first = clips.start;
-        self.least.resize_with(frames.len(), Vec::new);
+        self.bounds.resize_with(frames.len(), Vec::new);
         // Old values from an earlier panel are never read, because each bound is computed before it is used.
-        let rows = self.least.iter_mut().zip(frames);
-        rows.for_each(|(least, row)| least.resize(n_frames - row, 0));
+        let rows = self.bounds.iter_mut().zip(frames);
+        rows.for_each(|(bounds, row)| bounds.resize(n_frames - row, 0));
     }
 
-    /// Computes the bounds for the frames of all pairs in `near`, and drops the pairs whose bound reaches the
+    /// Computes the bounds for the frames of all pairs in `candidates`, and drops the pairs whose bound reaches the
     /// limit.
-    fn drop_far(&mut self, near: &mut [Marks], rows: &SquareSums, columns: &SquareSums) {
+    fn prune(&mut self, candidates: &mut [Marks], rows: &SquareSums, columns: &SquareSums) {
         let (first, f, cpu) = (self.first, self.distances.clip.frames, self.distances.cpu);
-        let (most, limit, weights) = (self.most, self.limit, &self.weights);
-        let of_frame = |(k, least): (usize, &mut Vec<u32>)| {
+        let (max_bound, limit, weights) = (self.max_bound, self.limit, &self.weights);
+        let bound_frame = |(k, bounds): (usize, &mut Vec<u32>)| {
             let row = first + k;
-            for run in frames_of(near, k, f).runs() {
-                let least = &mut least[run.clone()];
-                rows.against(cpu, row, columns, row + run.start, least);
-                least
+            for run in frames_of(candidates, k, f).runs() {
+                let bounds = &mut bounds[run.clone()];
+                rows.write_bounds(cpu, row, columns, row + run.start, bounds);
+                bounds
                     .iter_mut()
-                    .for_each(|least| *least = (*least).min(most));
+                    .for_each(|bounds| *bounds = (*bounds).min(max_bound));
             }
         };
-        self.least.par_iter_mut().enumerate().for_each(of_frame);
-        let least = &self.least;
-        let clips = near.par_iter_mut().enumerate();
-        clips.for_each(|(clip, near)| drop_far_of(near, &least[clip..], weights, limit));
+        self.bounds.par_iter_mut().enumerate().for_each(bound_frame);
+        let bounds = &self.bounds;
+        let clips = candidates.par_iter_mut().enumerate();
+        clips
+            .for_each(|(clip, candidates)| prune_clip(candidates, &bounds[clip..], weights, limit));
     }
 
     /// Returns the marked pairs of these clips with an exact distance below the limit.
-    fn exact(&mut self, first: usize, near: &[Marks]) -> Vec<Vec<ClipPair>> {
-        let tiles = Tiles::of(self.distances, first, near, &mut self.memory);
-        let one = |(from, near): (usize, &Marks)| {
+    fn exact_pairs(&mut self, first: usize, candidates: &[Marks]) -> Vec<Vec<ClipPair>> {
+        let tiles = Tiles::new(self.distances, first, candidates, &mut self.buffers);
+        let one = |(from, candidates): (usize, &Marks)| {
             let pair = |offset: usize| {
-                let weighed = (from..).zip(&self.weights);
-                let d = weighed.map(|(row, w)| w * tiles.sad(row, row + offset));
+                let weighted = (from..).zip(&self.weights);
+                let d = weighted.map(|(row, w)| w * tiles.sad(row, row + offset));
                 ClipPair {
                     from,
                     to: from + offset,
                     distance: d.sum(),
                 }
             };
-            let pairs = near.ones().map(pair);
+            let pairs = candidates.ones().map(pair);
             pairs.filter(|pair| pair.distance < self.limit).collect()
         };
-        let clips = (first..first + near.len()).into_par_iter().zip(near);
+        let clips = (first..first + candidates.len())
+            .into_par_iter()
+            .zip(candidates);
         clips.map(one).collect()
     }
 }
@@ -174,26 +177,26 @@ fn frames_of(clips: &[Marks], row: usize, f: usize) -> Marks {
     let within = clips[..clips.len().min(row + 1)].iter();
     let mut within = within.skip((row + 1).saturating_sub(f));
     let mut frames = within.next().cloned().unwrap_or_default();
-    within.for_each(|clip| frames.add(clip, 0));
+    within.for_each(|clip| frames.union(clip, 0));
     frames
 }
 
 /// Drops the pairs of a clip whose summed bounds reach the limit. The sums fit 32 bits.
-fn drop_far_of(near: &mut Marks, least: &[Vec<u32>], weights: &[u64], limit: u64) {
+fn prune_clip(candidates: &mut Marks, bounds: &[Vec<u32>], weights: &[u64], limit: u64) {
     let mut sums = Vec::new();
-    let runs: Vec<Range<usize>> = near.runs().collect();
+    let runs: Vec<Range<usize>> = candidates.runs().collect();
     for run in runs {
         sums.clear();
         sums.resize(run.len(), 0u32);
-        for (&weight, row) in weights.iter().zip(least) {
+        for (&weight, row) in weights.iter().zip(bounds) {
             let each = sums.iter_mut().zip(&row[run.clone()]);
             match weight as u32 {
-                1 => each.for_each(|(sum, least)| *sum += least),
-                weight => each.for_each(|(sum, least)| *sum += least * weight),
+                1 => each.for_each(|(sum, bounds)| *sum += bounds),
+                weight => each.for_each(|(sum, bounds)| *sum += bounds * weight),
             }
         }
-        let far = run.zip(&sums).filter(|&(_, &sum)| u64::from(sum) >= limit);
-        far.for_each(|(offset, _)| near.unmark(offset));
+        let pruned = run.zip(&sums).filter(|&(_, &sum)| u64::from(sum) >= limit);
+        pruned.for_each(|(offset, _)| candidates.unmark(offset));
     }
 }
 
@@ -207,11 +210,11 @@ struct Tiles {
 
 impl Tiles {
     /// Computes the tiles for the frames of the marked pairs. The first clip is `first_clip`.
-    fn of(
+    fn new(
         distances: &Distances<'_>,
         first_clip: usize,
         clips: &[Marks],
-        memory: &mut Vec<GroupMemory>,
+        buffers: &mut Vec<GroupBuffer>,
     ) -> Tiles {
         let f = distances.clip.frames;
         let frames: Vec<Marks> = (0..clips.len() + f - 1)
@@ -219,18 +222,18 @@ impl Tiles {
             .collect();
         let first = first_clip / GROUP;
         let last = (first_clip + frames.len() - 1) / GROUP;
-        memory.resize_with(memory.len().max(last + 1 - first), GroupMemory::default);
+        buffers.resize_with(buffers.len().max(last + 1 - first), GroupBuffer::default);
         let rows: Vec<Group<'_>> = (first..=last)
-            .zip(memory)
-            .map(|(group_idx, memory)| distances.row_group(group_idx, memory))
+            .zip(buffers)
+            .map(|(group_idx, buffer)| distances.row_group(group_idx, buffer))
             .collect();
-        let of_columns = |memory: &mut GroupMemory, column_idx: usize| {
+        let of_columns = |buffer: &mut GroupBuffer, column_idx: usize| {
             let wanted = |row_idx: usize| wanted(&frames, first_clip, [row_idx, column_idx]);
             let wanted: Vec<Wanted> = (first..=last).map(wanted).collect();
             if wanted.as_flattened().iter().all(|&bits| bits == 0) {
                 return vec![None; rows.len()];
             }
-            let columns = distances.pixels.group(column_idx, memory);
+            let columns = distances.pixels.group(column_idx, buffer);
             let tile = |(&rows, wanted): (&Group<'_>, &Wanted)| {
                 let tile = Tile {
                     rows,
@@ -245,7 +248,7 @@ impl Tiles {
         let columns = (first..distances.pixels.n_groups()).into_par_iter();
         Tiles {
             first,
-            tiles: columns.map_init(GroupMemory::default, of_columns).collect(),
+            tiles: columns.map_init(GroupBuffer::default, of_columns).collect(),
         }
     }
 

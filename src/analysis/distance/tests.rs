@@ -61,7 +61,7 @@ fn poses(view: View, headings_rad: impl IntoIterator<Item = Option<f64>>) -> Pos
     }
 }
 
-fn from_the_side(sprites: &Sprites) -> Poses {
+fn side_poses(sprites: &Sprites) -> Poses {
     poses(View::Side, vec![Some(0.0); sprites.n_frames()])
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn matrix_of_gray_levels(levels: &[u8], n_pixels: u32) -> DistanceMat
         rgba.as_chunks_mut::<4>().0.fill([level, level, level, 255]);
     });
     let distances = Distances {
-        pixels: &compared(&sprites, &from_the_side(&sprites), Planes::Rgba),
+        pixels: &compared(&sprites, &side_poses(&sprites), Planes::Rgba),
         clip: uniform(1),
         side: Side::Plain,
         cpu: Level::detect(),
@@ -141,7 +141,7 @@ fn triangle_by_definition(sprites: &Sprites, f: usize, side: Side) -> Vec<Vec<u6
 }
 
 #[test]
-fn every_level_gives_the_sums_of_the_definition_at_the_edges_of_its_tiles() {
+fn every_level_equals_the_definition_at_tile_edges() {
     // Sizes around groups of 48, lines of 64 bytes and blocks of 1 KB; clips longer than the footage.
     for (w, h, n_frames, f) in [
         (1, 1, 1, 1),
@@ -156,7 +156,7 @@ fn every_level_gives_the_sums_of_the_definition_at_the_edges_of_its_tiles() {
         for side in [Side::Plain, Side::Mirrored] {
             let wanted = triangle_by_definition(&sprites, f, side);
             for cpu in Level::available() {
-                let found = triangle(&sprites, &from_the_side(&sprites), f, side, cpu);
+                let found = triangle(&sprites, &side_poses(&sprites), f, side, cpu);
                 assert!(
                     found == wanted,
                     "{w}x{h}, {n_frames} frames, {side:?}, {cpu:?}"
@@ -171,7 +171,7 @@ fn the_largest_possible_differences_do_not_overflow() {
     let draw = |frame_idx, rgba: &mut [u8]| rgba.fill(255 * frame_idx as u8);
     let sprites = drawn([64, 64], 2, draw);
     for cpu in Level::available() {
-        let found = triangle(&sprites, &from_the_side(&sprites), 1, Side::Plain, cpu);
+        let found = triangle(&sprites, &side_poses(&sprites), 1, Side::Plain, cpu);
         assert_eq!(found, [vec![0, 64 * 64 * 4 * 255], vec![0]]);
     }
 }
@@ -187,9 +187,9 @@ proptest! {
     ) {
         let sprites = noise(w, h, n_frames, seed);
         let side = if mirrored { Side::Mirrored } else { Side::Plain };
-        let scalar = triangle(&sprites, &from_the_side(&sprites), f, side, Level::Scalar);
+        let scalar = triangle(&sprites, &side_poses(&sprites), f, side, Level::Scalar);
         for cpu in Level::available() {
-            let found = triangle(&sprites, &from_the_side(&sprites), f, side, cpu);
+            let found = triangle(&sprites, &side_poses(&sprites), f, side, cpu);
             prop_assert!(found == scalar, "{cpu:?}");
         }
     }
@@ -201,7 +201,7 @@ fn one_thread_and_two_give_the_same() {
     let with_threads = |n| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build();
         pool.expect("threads can be made").install(|| {
-            let poses = from_the_side(&sprites);
+            let poses = side_poses(&sprites);
             triangle(&sprites, &poses, 8, Side::Mirrored, Level::detect())
         })
     };
@@ -209,7 +209,7 @@ fn one_thread_and_two_give_the_same() {
 }
 
 #[test]
-fn blocks_put_aside_are_compared_as_those_in_memory() {
+fn spilled_blocks_are_compared_as_those_in_memory() {
     // Five groups, so two panels. Every other sprite is partly blank.
     let sprites = drawn([40, 24], 200, |frame_idx, rgba| {
         let n = if frame_idx % 2 == 0 { 2000 } else { 3840 };
@@ -217,17 +217,17 @@ fn blocks_put_aside_are_compared_as_those_in_memory() {
             *byte = random::bits(5, &[frame_idx as u64, k as u64]) as u8;
         }
     });
-    let poses = from_the_side(&sprites);
-    let aside = ComparedSprites::holding(0, &sprites, &poses, Planes::Rgba);
-    let aside = aside.expect("memory has room");
+    let poses = side_poses(&sprites);
+    let spilled = ComparedSprites::with_memory(0, &sprites, &poses, Planes::Rgba);
+    let spilled = spilled.expect("memory has room");
     assert_eq!(
-        aside.steps(Level::detect()),
+        spilled.steps(Level::detect()),
         compared(&sprites, &poses, Planes::Rgba).steps(Level::detect())
     );
     for side in [Side::Plain, Side::Mirrored] {
         let held = triangle(&sprites, &poses, 3, side, Level::detect());
         assert!(
-            triangle_of(&aside, uniform(3), side, Level::detect()) == held,
+            triangle_of(&spilled, uniform(3), side, Level::detect()) == held,
             "{side:?}"
         );
     }
@@ -256,7 +256,7 @@ proptest! {
         });
         let poses = match from_above {
             true => poses(View::Top, (0..n_frames).map(|k| Some(k as f64 * 0.7))),
-            false => from_the_side(&sprites),
+            false => side_poses(&sprites),
         };
         let pixels = compared(&sprites, &poses, Planes::Rgba);
         for side in [Side::Plain, Side::Mirrored] {
@@ -269,7 +269,7 @@ proptest! {
                 let distances = Distances { pixels: &pixels, clip, side, cpu };
                 let mut rows = Vec::new();
                 let push = |_: usize, row: &[ClipPair]| rows.push(row.to_vec());
-                distances.for_each_row_below(limit, &Everything, &Silent, push).expect("nobody cancels");
+                distances.for_each_row_below(limit, &AllPairs, &Silent, push).expect("nobody cancels");
                 let below = |(from, row): (usize, &Vec<u64>)| -> Vec<ClipPair> {
                     let pair = |(to, &distance)| ClipPair { from, to, distance };
                     (from..).zip(row).map(pair).filter(|pair| pair.distance < limit).collect()
@@ -287,7 +287,7 @@ fn rgb_planes_leave_alpha_out() {
     let sprites = drawn([1, 1], 2, |frame_idx, rgba| {
         rgba.copy_from_slice(&colors[frame_idx])
     });
-    let poses = from_the_side(&sprites);
+    let poses = side_poses(&sprites);
     let d = |planes| compared(&sprites, &poses, planes).steps(Level::detect());
     assert_eq!(d(Planes::Rgb), [40]);
     assert_eq!(d(Planes::Rgba), [40 + 204]);
@@ -296,7 +296,7 @@ fn rgb_planes_leave_alpha_out() {
 /// Returns a letter L around the center of an 8 x 8 sprite, rotated by quarter turns.
 ///
 /// The long arm points along the heading. The short arm points to the left or right of it, by its sign.
-fn letter(quarter_turns: u32, short_arm: i32) -> (Sprites, Option<f64>) {
+fn letter_l(quarter_turns: u32, short_arm: i32) -> (Sprites, Option<f64>) {
     let mut bytes = [0; 256];
     for (x, y, red) in [(1, 1, 9), (3, 1, 90), (5, 1, 200), (1, 3 * short_arm, 50)] {
         // Pixel centers are at odd half pixels from the center. A quarter turn maps (x, y) to (-y, x).
@@ -322,24 +322,29 @@ fn top_view(letters: &[(Sprites, Option<f64>)]) -> (Sprites, Poses) {
 }
 
 #[test]
-fn from_above_an_animal_looks_the_same_wherever_it_points() {
-    let (sprites, poses) = top_view(&[letter(0, 1), letter(1, 1), letter(2, 1), letter(3, 1)]);
+fn in_top_view_the_heading_does_not_change_the_distance() {
+    let (sprites, poses) = top_view(&[
+        letter_l(0, 1),
+        letter_l(1, 1),
+        letter_l(2, 1),
+        letter_l(3, 1),
+    ]);
     for row in triangle(&sprites, &poses, 1, Side::Plain, Level::Scalar) {
         assert!(row.iter().all(|&distance| distance == 0), "{row:?}");
     }
 }
 
 #[test]
-fn from_above_the_mirror_is_across_the_animals_own_axis() {
+fn in_top_view_sprites_are_mirrored_across_the_body_axis() {
     // Pixel centers are at odd half pixels, so the mirror image of y = 1 is y = -1.
-    let (image, heading_rad) = letter(0, 1);
+    let (image, heading_rad) = letter_l(0, 1);
     let rows = image.sprite(0);
     let mirror_image = drawn([8, 8], 1, |_, rgba| {
         for (y, row) in rows.chunks_exact(32).enumerate() {
             rgba[(7 - y) * 32..][..32].copy_from_slice(row);
         }
     });
-    let (sprites, poses) = top_view(&[letter(3, 1), (mirror_image, heading_rad)]);
+    let (sprites, poses) = top_view(&[letter_l(3, 1), (mirror_image, heading_rad)]);
     assert_eq!(
         triangle(&sprites, &poses, 1, Side::Mirrored, Level::Scalar)[0][1],
         0
@@ -361,7 +366,7 @@ fn cancelling_stops_at_the_next_panel() {
     }
     let sprites = noise(8, 8, 5, 3);
     let distances = Distances {
-        pixels: &compared(&sprites, &from_the_side(&sprites), Planes::Rgba),
+        pixels: &compared(&sprites, &side_poses(&sprites), Planes::Rgba),
         clip: uniform(1),
         side: Side::Plain,
         cpu: Level::Scalar,
@@ -373,7 +378,7 @@ fn cancelling_stops_at_the_next_panel() {
 }
 
 #[test]
-fn the_matrix_holds_every_distance_both_ways_round() {
+fn the_matrix_is_symmetric() {
     let matrix = matrix_of_gray_levels(&[10, 13, 11, 30], 2);
     for (i, a) in [10u64, 13, 11, 30].into_iter().enumerate() {
         for (j, b) in [10u64, 13, 11, 30].into_iter().enumerate() {

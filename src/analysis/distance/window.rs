@@ -34,40 +34,38 @@ impl Clip {
 
 /// Turns successive rows of d into rows of D.
 pub(super) struct WindowSums {
-    slides: Vec<Slide>,
+    sums: Vec<SlidingSum>,
 }
 
 impl WindowSums {
     /// Creates the sums for a footage of `n_frames` frames.
     pub(super) fn new(clip: Clip, n_frames: usize) -> WindowSums {
-        let [n_slides, n_rows] = match clip.weights {
+        let [n_sums, n_rows] = match clip.weights {
             ClipWeights::Uniform => [1, clip.frames],
             ClipWeights::Binomial => [clip.frames - 1, 2],
         };
-        let slide = || Slide::new(n_rows, n_frames);
+        let sum = || SlidingSum::new(n_rows, n_frames);
         WindowSums {
-            slides: std::iter::repeat_with(slide).take(n_slides).collect(),
+            sums: std::iter::repeat_with(sum).take(n_sums).collect(),
         }
     }
 
     /// Takes d(r, r..) for the next r. From r = f - 1 on, returns D(i, i..) for i = r - f + 1.
     pub(super) fn push<'a>(&'a mut self, row: &'a [u64]) -> Option<&'a [u64]> {
-        self.slides
-            .iter_mut()
-            .try_fold(row, |row, slide| slide.push(row))
+        self.sums.iter_mut().try_fold(row, |row, sum| sum.push(row))
     }
 }
 
 /// A sliding sum of successive rows.
-struct Slide {
+struct SlidingSum {
     ring: Vec<Vec<u64>>,
     sums: Vec<u64>,
     n_pushed: usize,
 }
 
-impl Slide {
-    fn new(n_rows: usize, n_frames: usize) -> Slide {
-        Slide {
+impl SlidingSum {
+    fn new(n_rows: usize, n_frames: usize) -> SlidingSum {
+        SlidingSum {
             ring: vec![Vec::new(); n_rows],
             sums: vec![0; n_frames],
             n_pushed: 0,

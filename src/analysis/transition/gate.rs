@@ -21,16 +21,16 @@ pub(super) struct Gate {
     heading_gate_rad: f64,
     /// The compared quantity of each clip as a fraction of a circle, 2^32 units to the circle, so that
     /// differences wrap. Headings in side view, scaled turning rates in top view; 0 where unknown.
-    parts: Vec<u32>,
+    units: Vec<u32>,
     /// Largest difference that may pass, in the same units, with a margin for rounding.
-    most_parts: u32,
+    max_gap_units: u32,
 }
 
 /// Units per radian. Rounding errors are far below any relevant difference.
-const PARTS_PER_RAD: f64 = 4_294_967_296.0 / TAU;
+const UNITS_PER_RAD: f64 = 4_294_967_296.0 / TAU;
 /// Turning rates are clamped to this, radians per second, so that scaled rates differ by less than half a
 /// circle.
-const FASTEST_RAD_PER_S: f64 = 1000.0;
+const MAX_TURN_RATE_RAD_PER_S: f64 = 1000.0;
 /// Scale from turning rates to angles, radians per (radian per second). The difference between the two
 /// extreme rates then stays below half a circle.
 const RATE_SCALE: f64 = 1e-3;
@@ -39,30 +39,30 @@ impl Gate {
     /// Computes the gate for every clip of the footage.
     pub(super) fn new(poses: &Poses, clip_frames: usize, params: &Params) -> Gate {
         let headings: Vec<Option<f64>> = poses.frames.iter().map(|pose| pose.heading_rad).collect();
-        let of_clips = |value: fn(&[f64]) -> Option<f64>| -> Vec<Option<f64>> {
+        let per_clip = |value: fn(&[f64]) -> Option<f64>| -> Vec<Option<f64>> {
             headings
                 .windows(clip_frames)
                 .map(|clip| clip.iter().copied().collect::<Option<Vec<f64>>>())
                 .map(|clip| value(&clip?))
                 .collect()
         };
-        let per_frame = of_clips(|clip| Some(turn_rate(clip)));
-        let mean_heading_rad = of_clips(|clip| mean_rad(clip.iter().copied()));
-        let turn_rate_rad_per_s: Vec<Option<f64>> = per_frame
+        let rad_per_frame = per_clip(|clip| Some(turn_rate(clip)));
+        let mean_heading_rad = per_clip(|clip| mean_rad(clip.iter().copied()));
+        let turn_rate_rad_per_s: Vec<Option<f64>> = rad_per_frame
             .into_iter()
             .map(|rate| Some(rate? * poses.fps))
             .collect();
         let heading_gate_rad = params.heading_gate_deg.to_radians();
-        let (compared, most) = match poses.view {
+        let (compared, max_gap) = match poses.view {
             View::Side => (&mean_heading_rad, heading_gate_rad),
             View::Top => (&turn_rate_rad_per_s, TURN_GATE_RAD_PER_S * RATE_SCALE),
         };
         Gate {
-            parts: compared
+            units: compared
                 .iter()
-                .map(|v| parts(poses.view, v.unwrap_or(0.0)))
+                .map(|v| units(poses.view, v.unwrap_or(0.0)))
                 .collect(),
-            most_parts: ((most * PARTS_PER_RAD).ceil() as u32).saturating_add(4),
+            max_gap_units: ((max_gap * UNITS_PER_RAD).ceil() as u32).saturating_add(4),
             mean_heading_rad,
             turn_rate_rad_per_s,
             view: poses.view,
@@ -74,17 +74,17 @@ impl Gate {
     ///
     /// Every pair that passes is marked, and few others. The test uses integers, because it runs on every
     /// pair of the footage.
-    pub(super) fn mark(&self, i: usize, mirrored: bool, row: &mut Marks) {
+    pub(super) fn mark_passing(&self, i: usize, mirrored: bool, row: &mut Marks) {
         let turned = match (self.view, mirrored) {
             // Mirroring turns a heading h into pi - h and reverses a turning rate.
-            (_, false) => |parts: u32| parts,
-            (View::Side, true) => |parts: u32| (1u32 << 31).wrapping_sub(parts),
-            (View::Top, true) => |parts: u32| parts.wrapping_neg(),
+            (_, false) => |units: u32| units,
+            (View::Side, true) => |units: u32| (1u32 << 31).wrapping_sub(units),
+            (View::Top, true) => |units: u32| units.wrapping_neg(),
         };
-        let here = turned(self.parts[i]);
-        row.mark_where(&self.parts[i..], |&there| {
+        let here = turned(self.units[i]);
+        row.mark_where(&self.units[i..], |&there| {
             let gap = here.wrapping_sub(there) as i32;
-            gap.unsigned_abs() <= self.most_parts
+            gap.unsigned_abs() <= self.max_gap_units
         });
     }
 
@@ -93,7 +93,7 @@ impl Gate {
     ///
     /// A mirrored pair compares heading i with pi - heading j, and turning rate i with minus turning rate j.
     /// A clip with an unknown heading never passes.
-    pub(super) fn pass(&self, i: usize, j: usize, mirrored: bool) -> Option<f64> {
+    pub(super) fn passing_gap_rad(&self, i: usize, j: usize, mirrored: bool) -> Option<f64> {
         let (a, b) = (self.mean_heading_rad[i]?, self.mean_heading_rad[j]?);
         let gap_rad = wrap_rad(a - if mirrored { mirrored_rad(b) } else { b }).abs();
         let passes = match self.view {
@@ -108,12 +108,12 @@ impl Gate {
 }
 
 /// Returns a heading or a turning rate in units of a circle.
-fn parts(view: View, value: f64) -> u32 {
+fn units(view: View, value: f64) -> u32 {
     let rad = match view {
         View::Side => value,
-        View::Top => value.clamp(-FASTEST_RAD_PER_S, FASTEST_RAD_PER_S) * RATE_SCALE,
+        View::Top => value.clamp(-MAX_TURN_RATE_RAD_PER_S, MAX_TURN_RATE_RAD_PER_S) * RATE_SCALE,
     };
-    (rad * PARTS_PER_RAD).round() as i64 as u32
+    (rad * UNITS_PER_RAD).round() as i64 as u32
 }
 
 /// Returns the slope of a line fitted to the unwrapped headings, radians per frame; 0 for a single frame.
@@ -158,41 +158,45 @@ mod tests {
     }
 
     #[test]
-    fn from_the_side_clips_must_point_the_same_way() {
+    fn in_side_view_only_clips_of_similar_heading_pass() {
         // Mean headings of the clips: 1, 7.5, 16, 98.5 and 178 degrees.
         let gate = gate(View::Side, &[0.0, 2.0, 13.0, 19.0, 178.0, 178.0]);
         let gap_deg = gate
-            .pass(0, 1, false)
+            .passing_gap_rad(0, 1, false)
             .expect("6.5 degrees apart")
             .to_degrees();
         assert!((gap_deg - 6.5).abs() < 1e-9);
-        assert_eq!(gate.pass(0, 2, false), None, "exactly 15 degrees apart");
-        assert_eq!(gate.pass(0, 4, false), None);
+        assert_eq!(
+            gate.passing_gap_rad(0, 2, false),
+            None,
+            "exactly 15 degrees apart"
+        );
+        assert_eq!(gate.passing_gap_rad(0, 4, false), None);
     }
 
     #[test]
-    fn a_mirrored_pair_compares_with_the_heading_left_right_reversed() {
+    fn a_mirrored_pair_is_compared_with_the_mirrored_heading() {
         let gate = gate(View::Side, &[0.0, 2.0, 178.0, 178.0]);
         let gap_deg = gate
-            .pass(0, 2, true)
+            .passing_gap_rad(0, 2, true)
             .expect("178 mirrored is 2")
             .to_degrees();
         assert!((gap_deg - 1.0).abs() < 1e-9);
-        assert_eq!(gate.pass(0, 2, false), None);
+        assert_eq!(gate.passing_gap_rad(0, 2, false), None);
     }
 
     #[test]
-    fn from_above_clips_must_turn_alike_wherever_they_point() {
+    fn in_top_view_only_clips_of_similar_turn_rate_pass() {
         // Turning rates, degrees per second: +30 across the seam at 180 degrees, then +40 and -30.
         let gate = gate(View::Top, &[179.0, 182.0, 10.0, 14.0, 50.0, 47.0]);
-        assert!(gate.pass(0, 2, false).is_some());
-        assert!(gate.pass(0, 4, false).is_none());
-        assert!(gate.pass(0, 4, true).is_some());
+        assert!(gate.passing_gap_rad(0, 2, false).is_some());
+        assert!(gate.passing_gap_rad(0, 4, false).is_none());
+        assert!(gate.passing_gap_rad(0, 4, true).is_some());
     }
 
     /// Returns the difference of a pair minus the gate, radians or radians per second. Positive pairs do not
     /// pass.
-    fn beyond(gate: &Gate, (i, j): (usize, usize), mirrored: bool) -> f64 {
+    fn excess(gate: &Gate, i: usize, j: usize, mirrored: bool) -> f64 {
         let of = |values: &[Option<f64>], k: usize| values[k].expect("every heading is known");
         if gate.view == View::Top {
             let rate = |k| of(&gate.turn_rate_rad_per_s, k);
@@ -210,7 +214,7 @@ mod tests {
 
     proptest::proptest! {
         #[test]
-        fn whatever_passes_was_marked_and_hardly_anything_else(
+        fn marks_include_every_passing_pair_and_few_others(
             headings_deg in proptest::collection::vec(-179f64..180.0, 3..40),
             whole: bool, from_above: bool, mirrored: bool,
         ) {
@@ -222,13 +226,13 @@ mod tests {
             let gate = gate(if from_above { View::Top } else { View::Side }, &headings);
             for i in 0..headings.len() - 1 {
                 let mut row = Marks::none(headings.len() - 1 - i);
-                gate.mark(i, mirrored, &mut row);
+                gate.mark_passing(i, mirrored, &mut row);
                 let marked: Vec<usize> = row.ones().map(|k| i + k).collect();
                 for j in i..headings.len() - 1 {
                     let marked = marked.contains(&j);
-                    let passes = gate.pass(i, j, mirrored).is_some();
+                    let passes = gate.passing_gap_rad(i, j, mirrored).is_some();
                     proptest::prop_assert!(marked || !passes, "({}, {})", i, j);
-                    let on_edge = whole || beyond(&gate, (i, j), mirrored).abs() < 1e-5;
+                    let on_edge = whole || excess(&gate, i, j, mirrored).abs() < 1e-5;
                     proptest::prop_assert!(!marked || passes || on_edge, "({}, {})", i, j);
                 }
             }

@@ -7,31 +7,29 @@
 //! differs little; a flip on the spot is then a useful transition.
 
 mod gate;
-mod joinable;
 #[cfg(test)]
 mod tests;
 
-use crate::analysis::distance::{
-    Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Marks, Side,
-};
 use gate::Gate;
-use joinable::Joinable;
 
+use crate::analysis::distance::{
+    Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Marks, PairFilter, Side,
+};
 use crate::analysis::{Error, Params, playback};
 use crate::cpu::Level;
 use crate::library::{Patch, Playback, Poses, Sprites, Transition};
 use crate::progress::Progress;
 
 /// Multiples of the natural step that are tried after `kappa` where the component is too small. Free choice.
-const KAPPA_LADDER: [f64; 3] = [2.5, 3.0, 4.0];
+const WIDER_KAPPAS: [f64; 3] = [2.5, 3.0, 4.0];
 /// Factor between further multiples. Free choice.
 const KAPPA_GROWTH: f64 = 1.5;
 /// Shortest sufficient component, seconds. Free choice.
-const LEAST_COMPONENT_S: f64 = 2.0;
+const MIN_COMPONENT_S: f64 = 2.0;
 /// Smallest sufficient share of the frames that the largest multiple joins. Free choice.
-const LEAST_SHARE: f64 = 0.75;
+const MIN_SHARE: f64 = 0.75;
 /// Smallest distance between the clips of an unmirrored pair, seconds. Free choice.
-const LEAST_GAP_S: f64 = 0.5;
+const MIN_GAP_S: f64 = 0.5;
 
 /// The transitions of a footage and the playback they allow.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,13 +69,14 @@ pub fn connect(
     progress: &dyn Progress,
 ) -> Result<Connections, Error> {
     let pixels = ComparedSprites::new(sprites, poses, params.planes)?;
-    connect_compared(&pixels, (sprites, poses), params, cpu, progress)
+    connect_compared(&pixels, sprites, poses, params, cpu, progress)
 }
 
 /// Works like [`connect`], on sprites already laid out for comparison.
 pub fn connect_compared(
     pixels: &ComparedSprites,
-    (sprites, poses): (&Sprites, &Poses),
+    sprites: &Sprites,
+    poses: &Poses,
     params: &Params,
     cpu: Level,
     progress: &dyn Progress,
@@ -85,61 +84,68 @@ pub fn connect_compared(
     let clip_frames = params.clip_frames_at(poses.fps);
     let clips = Clips::new(sprites, poses, clip_frames);
     let clip = params.clip(clip_frames);
-    let steps = natural_steps(pixels.steps(cpu), &clips, &clip.weights());
-    let mut usable = Marks::none(clips.usable.len());
-    usable.mark_where(&clips.usable, |&usable| usable);
-    let search = Search {
+    let steps = natural_steps(&pixels.steps(cpu), &clips, &clip.weights());
+    let gate = Gate::new(poses, clip_frames, params);
+    let min_gap = clip_frames.max((MIN_GAP_S * poses.fps).ceil() as usize);
+    let search_of = |side: Side, min_gap: usize| Search {
         distances: Distances {
             pixels,
             clip,
-            side: Side::Plain,
+            side,
             cpu,
         },
         clips: &clips,
-        gate: Gate::new(poses, clip_frames, params),
-        usable,
-        least_gap: clip_frames.max((LEAST_GAP_S * poses.fps).ceil() as usize),
+        gate: &gate,
+        min_gap,
     };
-    let at = |rung: Rung| -> Result<Connections, Error> {
-        let found = search.run(rung, params.mirror, progress);
-        let found = found.map_err(|Cancelled| Error::Cancelled)?;
-        Ok(found.connections(rung, &clips, steps.median))
+    let mut searches = vec![search_of(Side::Plain, min_gap)];
+    if params.mirror {
+        searches.push(search_of(Side::Mirrored, 0));
+    }
+    let connections_below = |threshold: Threshold| -> Result<Connections, Error> {
+        let mut found = Found::default();
+        for search in &searches {
+            let result = search.run(threshold.epsilon, progress, &mut found);
+            result.map_err(|Cancelled| Error::Cancelled)?;
+        }
+        Ok(found.connections(threshold, &clips, steps.median))
     };
-    strictest_enough(&rungs(params, steps), &clips, poses.fps, at)
+    strictest_sufficient(
+        &thresholds(params, steps),
+        &clips,
+        poses.fps,
+        connections_below,
+    )
 }
 
-/// Returns the connections of the strictest sufficient epsilon.
+/// Returns the connections of the strictest sufficient threshold.
 ///
-/// An epsilon is sufficient if its component lasts long enough and holds most of the frames that the widest
-/// one joins. A wider epsilon gives more visible jumps, so it must add many playable frames.
-fn strictest_enough(
-    rungs: &[Rung],
+/// A threshold is sufficient if its component lasts long enough and holds most of the frames that the widest
+/// one joins. A wider threshold gives more visible jumps, so it must add many playable frames.
+fn strictest_sufficient(
+    thresholds: &[Threshold],
     clips: &Clips,
     fps: f64,
-    mut at: impl FnMut(Rung) -> Result<Connections, Error>,
+    connections_below: impl Fn(Threshold) -> Result<Connections, Error>,
 ) -> Result<Connections, Error> {
-    let least = |n_frames: usize| (LEAST_SHARE * n_frames as f64).max(LEAST_COMPONENT_S * fps);
+    let min_played = |n_frames: usize| (MIN_SHARE * n_frames as f64).max(MIN_COMPONENT_S * fps);
     let n_played = |playback: &Playback| playback.component.len() as f64;
-    let (first, last) = (0, rungs.len() - 1);
-    let strictest = at(rungs[first])?;
+    let last = thresholds.len() - 1;
+    let strictest = connections_below(thresholds[0])?;
     let n_shown = clips.shown.iter().filter(|&&shown| shown).count();
-    if last == first || n_played(&strictest.playback) >= least(n_shown) {
+    if last == 0 || n_played(&strictest.playback) >= min_played(n_shown) {
         return Ok(strictest);
     }
-    let widest = at(rungs[last])?;
+    let widest = connections_below(thresholds[last])?;
     // A local minimum at the widest epsilon is also one at every stricter epsilon above its distance.
-    let is_enough = |rung: &Rung| {
-        let nearer = widest
-            .transitions
-            .iter()
-            .copied()
-            .filter(|t| t.distance < rung.epsilon);
-        let playback = clips.playback(&nearer.collect::<Vec<_>>());
-        n_played(&playback) >= least(widest.playback.component.len())
+    let is_sufficient = |threshold: &Threshold| {
+        let mut nearer = widest.transitions.clone();
+        nearer.retain(|t| t.distance < threshold.epsilon);
+        n_played(&clips.playback(&nearer)) >= min_played(widest.playback.component.len())
     };
-    match rungs.iter().position(is_enough) {
-        Some(rung_idx) if rung_idx == first => Ok(strictest),
-        Some(rung_idx) if rung_idx < last => at(rungs[rung_idx]),
+    match thresholds.iter().position(is_sufficient) {
+        Some(0) => Ok(strictest),
+        Some(k) if k < last => connections_below(thresholds[k]),
         _ => Ok(widest),
     }
 }
@@ -149,6 +155,8 @@ struct Clips {
     clip_frames: usize,
     shown: Vec<bool>,
     usable: Vec<bool>,
+    /// The same as `usable`.
+    usable_marks: Marks,
     all_present: Vec<bool>,
 }
 
@@ -157,20 +165,20 @@ impl Clips {
         let present: Vec<bool> = (0..sprites.n_frames())
             .map(|frame_idx| sprites.is_present(frame_idx))
             .collect();
-        let shown: Vec<bool> = present
-            .iter()
-            .zip(&poses.frames)
+        let shown: Vec<bool> = (present.iter().zip(&poses.frames))
             .map(|(&present, pose)| present && !pose.cut && pose.heading_rad.is_some())
             .collect();
         let whole = |frames: &[bool]| -> Vec<bool> {
-            frames
-                .windows(clip_frames)
-                .map(|clip| clip.iter().all(|&frame| frame))
-                .collect()
+            let clips = frames.windows(clip_frames);
+            clips.map(|clip| clip.iter().all(|&frame| frame)).collect()
         };
+        let usable = whole(&shown);
+        let mut usable_marks = Marks::none(usable.len());
+        usable_marks.mark_where(&usable, |&usable| usable);
         Clips {
             clip_frames,
-            usable: whole(&shown),
+            usable,
+            usable_marks,
             all_present: whole(&present),
             shown,
         }
@@ -188,17 +196,17 @@ struct NaturalSteps {
     p99: u64,
 }
 
-fn natural_steps(steps: Vec<u64>, clips: &Clips, weights: &[u64]) -> NaturalSteps {
-    let mut of_clips: Vec<u64> = steps
+fn natural_steps(steps: &[u64], clips: &Clips, weights: &[u64]) -> NaturalSteps {
+    let mut clip_steps: Vec<u64> = steps
         .windows(clips.clip_frames)
         .zip(clips.all_present.windows(2))
         .filter(|(_, present)| present[0] && present[1])
         .map(|(steps, _)| steps.iter().zip(weights).map(|(d, w)| d * w).sum())
         .collect();
-    of_clips.sort_unstable();
+    clip_steps.sort_unstable();
     let at = |percent: usize| {
-        let rank = of_clips.len().saturating_sub(1) * percent / 100;
-        of_clips.get(rank).copied().unwrap_or(0)
+        let rank = clip_steps.len().saturating_sub(1) * percent / 100;
+        clip_steps.get(rank).copied().unwrap_or(0)
     };
     NaturalSteps {
         median: at(50),
@@ -208,7 +216,7 @@ fn natural_steps(steps: Vec<u64>, clips: &Clips, weights: &[u64]) -> NaturalStep
 
 /// A candidate for epsilon, with the kappa that gave it.
 #[derive(Clone, Copy)]
-struct Rung {
+struct Threshold {
     kappa: Option<f64>,
     epsilon: u64,
 }
@@ -217,21 +225,21 @@ struct Rung {
 ///
 /// An animal that rests most of the time has a natural step near 0. The candidates then grow up to the 99th
 /// percentile of its steps, the change while it moves.
-fn rungs(params: &Params, steps: NaturalSteps) -> Vec<Rung> {
+fn thresholds(params: &Params, steps: NaturalSteps) -> Vec<Threshold> {
     if let Some(epsilon) = params.epsilon {
-        return vec![Rung {
+        return vec![Threshold {
             kappa: None,
             epsilon,
         }];
     }
-    let liveliest = steps.p99 as f64 / steps.median.max(1) as f64;
-    let highest = KAPPA_LADDER[KAPPA_LADDER.len() - 1].max(params.kappa);
+    let largest = steps.p99 as f64 / steps.median.max(1) as f64;
+    let highest = WIDER_KAPPAS[WIDER_KAPPAS.len() - 1].max(params.kappa);
     let growing = std::iter::successors(Some(highest), |kappa| Some(KAPPA_GROWTH * kappa)).skip(1);
     std::iter::once(params.kappa)
-        .chain(KAPPA_LADDER.into_iter().filter(|&k| k > params.kappa))
-        .chain(growing.take_while(|&kappa| kappa < liveliest))
-        .chain((liveliest > highest).then_some(liveliest))
-        .map(|kappa| Rung {
+        .chain(WIDER_KAPPAS.into_iter().filter(|&k| k > params.kappa))
+        .chain(growing.take_while(|&kappa| kappa < largest))
+        .chain((largest > highest).then_some(largest))
+        .map(|kappa| Threshold {
             kappa: Some(kappa),
             // D is an integer, so D < x is equivalent to D < ceil(x).
             epsilon: (kappa * steps.median as f64).ceil() as u64,
@@ -239,78 +247,62 @@ fn rungs(params: &Params, steps: NaturalSteps) -> Vec<Rung> {
         .collect()
 }
 
-/// The criteria that decide which pairs become transitions.
+/// The search for transitions among the plain or the mirrored pairs.
 struct Search<'a> {
     distances: Distances<'a>,
     clips: &'a Clips,
-    gate: Gate,
-    /// The clips that can be used.
-    usable: Marks,
-    least_gap: usize,
+    gate: &'a Gate,
+    /// Smallest distance between the clips of a pair, clips.
+    min_gap: usize,
 }
 
-/// The result of a search below one epsilon.
+/// The result of the searches below one epsilon.
 #[derive(Default)]
 struct Found {
     transitions: Vec<Transition>,
-    /// Number of pairs before the selection of local minima.
+    /// Number of unmirrored pairs before the selection of local minima.
     n_candidates: u64,
 }
 
 impl Search<'_> {
-    fn run(&self, rung: Rung, mirror: bool, progress: &dyn Progress) -> Result<Found, Cancelled> {
-        let mut found = Found::default();
-        self.one_side(Side::Plain, rung.epsilon, progress, &mut found)?;
-        if mirror {
-            self.one_side(Side::Mirrored, rung.epsilon, progress, &mut found)?;
-        }
-        let key = |t: &Transition| (t.from, t.to, t.mirrored);
-        found.transitions.sort_unstable_by_key(key);
-        Ok(found)
-    }
-
-    fn one_side(
+    /// Adds the transitions below an epsilon.
+    fn run(
         &self,
-        side: Side,
         epsilon: u64,
         progress: &dyn Progress,
         found: &mut Found,
     ) -> Result<(), Cancelled> {
-        let asked = self.joinable(side);
-        let least_gap = asked.least_gap;
-        let mut minima = LocalMinima::new(&self.clips.usable, least_gap, epsilon);
-        let distances = Distances {
-            side,
-            ..self.distances
-        };
-        distances.for_each_row_below(epsilon, &asked, progress, |i, pairs| {
-            found.count(i, pairs, &asked);
+        let mut minima = LocalMinima::new(&self.clips.usable, self.min_gap, epsilon);
+        let on_row = |_: usize, pairs: &[ClipPair]| {
+            if !self.is_mirrored() {
+                let joinable = pairs.iter().filter(|pair| self.may_join(pair));
+                found.n_candidates += joinable.count() as u64;
+            }
             let transitions = &mut found.transitions;
-            minima.push(pairs, |pair| {
-                transitions.extend(self.transition(pair, &asked))
-            });
-        })?;
-        let transitions = &mut found.transitions;
-        minima.finish(|pair| transitions.extend(self.transition(pair, &asked)));
+            minima.push(pairs, |pair| transitions.extend(self.transition(pair)));
+        };
+        (self.distances).for_each_row_below(epsilon, self, progress, on_row)?;
+        minima.finish(|pair| found.transitions.extend(self.transition(pair)));
         Ok(())
     }
 
-    fn joinable(&self, side: Side) -> Joinable<'_> {
-        let least_gap = match side {
-            Side::Plain => self.least_gap,
-            Side::Mirrored => 0,
-        };
-        Joinable {
-            search: self,
-            side,
-            least_gap,
-        }
+    fn is_mirrored(&self) -> bool {
+        self.distances.side == Side::Mirrored
     }
 
-    /// Returns the transition of a local minimum, or `None` if the pair may not be joined.
-    fn transition(&self, pair: ClipPair, asked: &Joinable<'_>) -> Option<Transition> {
-        let mirrored = asked.side == Side::Mirrored;
-        let heading_gap_rad = self.gate.pass(pair.from, pair.to, mirrored)?;
+    /// Returns whether the clips of a pair may be joined, whatever their distance.
+    fn may_join(&self, pair: &ClipPair) -> bool {
+        let usable = &self.clips.usable;
+        pair.to - pair.from >= self.min_gap
+            && usable[pair.from]
+            && usable[pair.to]
+            && self.transition(*pair).is_some()
+    }
+
+    /// Returns the transition of a pair of usable clips, or `None` if the pair does not pass the gate.
+    fn transition(&self, pair: ClipPair) -> Option<Transition> {
+        let mirrored = self.is_mirrored();
+        let heading_gap_rad = self.gate.passing_gap_rad(pair.from, pair.to, mirrored)?;
         Some(Transition {
             from: pair.from as u32,
             to: pair.to as u32,
@@ -321,27 +313,33 @@ impl Search<'_> {
     }
 }
 
-impl Found {
-    /// Counts the similar pairs of a clip that may be joined.
-    fn count(&mut self, i: usize, pairs: &[ClipPair], asked: &Joinable<'_>) {
-        let later = pairs
-            .iter()
-            .map(|pair| pair.to)
-            .filter(|j| j - i >= asked.least_gap);
-        if asked.side == Side::Plain {
-            self.n_candidates += later.filter(|&j| asked.holds(i, j)).count() as u64;
+impl PairFilter for Search<'_> {
+    fn mark(&self, i: usize, row: &mut Marks) {
+        if self.clips.usable[i] {
+            self.gate.mark_passing(i, self.is_mirrored(), row);
+            row.unmark_first(self.min_gap);
+            row.intersect(&self.clips.usable_marks, i);
         }
     }
+}
 
+impl Found {
     /// Builds the playback graph of the transitions.
-    fn connections(self, rung: Rung, clips: &Clips, natural_step: u64) -> Connections {
+    fn connections(
+        mut self,
+        threshold: Threshold,
+        clips: &Clips,
+        natural_step: u64,
+    ) -> Connections {
+        self.transitions
+            .sort_unstable_by_key(|t| (t.from, t.to, t.mirrored));
         let playback = clips.playback(&self.transitions);
         let n_frames = clips.shown.len();
         Connections {
             clip_frames: clips.clip_frames,
-            epsilon: rung.epsilon,
+            epsilon: threshold.epsilon,
             natural_step,
-            kappa_used: rung.kappa,
+            kappa_used: threshold.kappa,
             n_candidates: self.n_candidates,
             component_share: playback.component.len() as f64 / n_frames.max(1) as f64,
             patches: playback::patches(&playback),

@@ -76,7 +76,7 @@ fn connections(moments: &[Option<Moment>], params: &Params) -> Connections {
 }
 
 #[test]
-fn an_animal_that_repeats_its_stroke_may_jump_by_whole_strokes() {
+fn repeated_strokes_are_joined_a_whole_number_of_strokes_apart() {
     let found = connections(&strokes(201, 0.0), &params());
     assert!(found.natural_step > 0);
     assert_eq!(found.epsilon, 2 * found.natural_step);
@@ -92,7 +92,7 @@ fn an_animal_that_repeats_its_stroke_may_jump_by_whole_strokes() {
 }
 
 #[test]
-fn candidates_are_counted_before_only_the_nearest_are_kept() {
+fn candidates_are_counted_before_local_minima_are_selected() {
     let still = vec![Some((0.0, 0.0)); 10];
     let params = Params {
         epsilon: Some(1),
@@ -118,17 +118,14 @@ fn by_definition(
     let clips = Clips::new(sprites, poses, f);
     let gate = Gate::new(poses, f, params);
     let mut all = Vec::new();
-    for (side, least_gap) in [
-        (
-            Side::Plain,
-            f.max((LEAST_GAP_S * poses.fps).ceil() as usize),
-        ),
+    for (side, min_gap) in [
+        (Side::Plain, f.max((MIN_GAP_S * poses.fps).ceil() as usize)),
         (Side::Mirrored, 0),
     ] {
         let mirrored = side == Side::Mirrored;
-        let mut minima = LocalMinima::new(&clips.usable, least_gap, epsilon);
+        let mut minima = LocalMinima::new(&clips.usable, min_gap, epsilon);
         let mut keep = |pair: ClipPair| {
-            let gap = gate.pass(pair.from, pair.to, mirrored);
+            let gap = gate.passing_gap_rad(pair.from, pair.to, mirrored);
             all.extend(gap.map(|heading_gap_rad| Transition {
                 from: pair.from as u32,
                 to: pair.to as u32,
@@ -163,7 +160,7 @@ proptest! {
 
     /// An animal that turns and strokes at random, and is sometimes missing, cut, or without a heading.
     #[test]
-    fn with_the_gate_first_the_transitions_are_those_of_all_distances(
+    fn pruned_search_finds_the_transitions_of_all_distances(
         (n_frames, f, seed) in (1usize..230, 1u32..6, any::<u64>()),
         (turn, kappa, gate_deg) in (0.0f64..0.6, 0.5f64..6.0, 2.0f64..60.0),
         from_above: bool,
@@ -208,7 +205,7 @@ fn epsilon_is_strict() {
 }
 
 #[test]
-fn clips_that_point_elsewhere_are_not_joined() {
+fn clips_of_different_heading_are_not_joined() {
     let mut moments = strokes(40, 0.0);
     moments.extend(strokes(40, 0.5));
     let found = connections(&moments, &params());
@@ -277,7 +274,7 @@ fn epsilon_grows_while_the_component_is_short() {
 }
 
 #[test]
-fn epsilon_grows_where_much_more_is_joined_by_it() {
+fn epsilon_grows_if_many_more_frames_become_playable() {
     // Two strokes, then three seconds of faster strokes in the other direction. These are similar to the
     // first part only at a wider epsilon.
     let mut moments = strokes(41, 0.0);
@@ -294,7 +291,7 @@ fn epsilon_grows_where_much_more_is_joined_by_it() {
 }
 
 #[test]
-fn epsilon_stays_where_nothing_joins_the_rest() {
+fn epsilon_stays_if_no_more_frames_become_playable() {
     let mut moments = strokes(41, 0.0);
     moments.extend((0..30).map(|k| Some((f64::from(k) / 35.0, 0.5))));
     let found = connections(&moments, &params());
@@ -305,10 +302,10 @@ fn epsilon_stays_where_nothing_joins_the_rest() {
 #[test]
 fn epsilon_grows_to_the_steps_of_an_animal_that_rests() {
     let kappas = |p99| {
-        let rungs = rungs(&params(), NaturalSteps { median: 10, p99 });
-        rungs
+        let thresholds = thresholds(&params(), NaturalSteps { median: 10, p99 });
+        thresholds
             .iter()
-            .map(|rung| rung.kappa.expect("not given"))
+            .map(|threshold| threshold.kappa.expect("not given"))
             .collect::<Vec<_>>()
     };
     assert_eq!(kappas(30), [2.0, 2.5, 3.0, 4.0]);

@@ -10,13 +10,13 @@ use std::arch::x86_64::*;
 use std::ops::Range;
 
 use super::{LANES, SadTile, Tile};
-use crate::analysis::distance::group::{BLOCK, Block};
+use crate::analysis::distance::group::{BLOCK_BYTES, Block};
 
 /// Largest number of rows against two columns. Their sums, two columns, one row and one difference fill the
 /// registers.
-const MOST_ROWS: usize = 6;
+const MAX_ROWS: usize = 6;
 /// Number of 32-byte loads per block.
-const STEPS: usize = BLOCK / 32;
+const STEPS: usize = BLOCK_BYTES / 32;
 
 /// Works like `scalar::sad_tile`. Panics without AVX2.
 pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
@@ -27,28 +27,28 @@ pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
 
 #[target_feature(enable = "avx2")]
 fn sad_tile_avx2(tile: Tile<'_>, sums: &mut SadTile) {
-    *sums = tile.apart();
+    *sums = tile.disjoint_sums();
     let strips = strips(&tile);
     for block in 0..tile.rows.n_blocks() {
         for strip in &strips {
             // Groups are padded to 48 sprites, so both columns exist.
             let columns = strip.column..strip.column + 2;
-            if !tile.meet(block, [&strip.rows, &columns]) {
+            if !tile.overlap(block, [&strip.rows, &columns]) {
                 continue;
             }
             match strip.rows.len() {
-                1 => put_strip::<1>(tile, block, strip, sums),
-                2 => put_strip::<2>(tile, block, strip, sums),
-                3 => put_strip::<3>(tile, block, strip, sums),
-                4 => put_strip::<4>(tile, block, strip, sums),
-                5 => put_strip::<5>(tile, block, strip, sums),
-                _ => put_strip::<MOST_ROWS>(tile, block, strip, sums),
+                1 => add_strip::<1>(tile, block, strip, sums),
+                2 => add_strip::<2>(tile, block, strip, sums),
+                3 => add_strip::<3>(tile, block, strip, sums),
+                4 => add_strip::<4>(tile, block, strip, sums),
+                5 => add_strip::<5>(tile, block, strip, sums),
+                _ => add_strip::<MAX_ROWS>(tile, block, strip, sums),
             }
         }
     }
 }
 
-/// Successive rows, at most [`MOST_ROWS`], against two columns.
+/// Successive rows, at most [`MAX_ROWS`], against two columns.
 struct Strip {
     rows: Range<usize>,
     column: usize,
@@ -59,15 +59,15 @@ struct Strip {
 fn strips(tile: &Tile<'_>) -> Vec<Strip> {
     let mut strips = Vec::new();
     for column in (0..tile.columns.n_sprites).step_by(2) {
-        let asked = (0..).zip(tile.wanted);
-        let mut rest = asked.fold(0u64, |rows, (row, wanted)| {
+        let rows = (0..).zip(tile.wanted);
+        let mut rest = rows.fold(0u64, |rows, (row, wanted)| {
             rows | u64::from(wanted >> column & 3 != 0) << row
         });
         while rest != 0 {
             let start = rest.trailing_zeros() as usize;
             let n_rows = (!(rest >> start)).trailing_zeros() as usize;
             rest &= !(((1 << n_rows) - 1) << start);
-            let n_pieces = n_rows.div_ceil(MOST_ROWS);
+            let n_pieces = n_rows.div_ceil(MAX_ROWS);
             let cut = |k: usize| start + k * n_rows / n_pieces;
             let pieces = (0..n_pieces).map(|k| cut(k)..cut(k + 1));
             strips.extend(pieces.map(|rows| Strip { rows, column }));
@@ -79,13 +79,13 @@ fn strips(tile: &Tile<'_>) -> Vec<Strip> {
 
 #[inline]
 #[target_feature(enable = "avx2")]
-fn put_strip<const R: usize>(tile: Tile<'_>, block: usize, strip: &Strip, sums: &mut SadTile) {
+fn add_strip<const R: usize>(tile: Tile<'_>, block: usize, strip: &Strip, sums: &mut SadTile) {
     let (row, column) = (strip.rows.start, strip.column);
     let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
     let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
     for (row, of_row) in (row..).zip(sad_rows::<R>(a, b)) {
         for (column, d) in (column..).zip(of_row) {
-            tile.put(block, [row, column], d.into(), sums);
+            tile.correct(block, [row, column], d.into(), sums);
         }
     }
 }
@@ -96,7 +96,7 @@ fn put_strip<const R: usize>(tile: Tile<'_>, block: usize, strip: &Strip, sums: 
 fn sad_rows<const R: usize>(a: [&Block; R], b: [&Block; 2]) -> [[u32; 2]; R] {
     let mut sums = [[_mm256_setzero_si256(); 2]; R];
     for step in 0..STEPS {
-        fetch_next(b[1], step);
+        prefetch_next(b[1], step);
         let b = [load(b[0], step), load(b[1], step)];
         for row in 0..R {
             let a = load(a[row], step);
@@ -120,8 +120,8 @@ fn sad_rows<const R: usize>(a: [&Block; R], b: [&Block; 2]) -> [[u32; 2]; R] {
 /// Prefetches one of the 32 cache lines after this block: usually those of the next two columns.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn fetch_next(block: &Block, step: usize) {
-    let line = block.0.as_ptr().wrapping_add(BLOCK + step * 64);
+fn prefetch_next(block: &Block, step: usize) {
+    let line = block.0.as_ptr().wrapping_add(BLOCK_BYTES + step * 64);
     // A prefetch reads nothing, so any address is allowed.
     _mm_prefetch::<_MM_HINT_T0>(line.cast());
 }
@@ -153,15 +153,15 @@ fn load(block: &Block, step: usize) -> __m256i {
     unsafe { _mm256_load_si256(block.0.as_ptr().cast::<__m256i>().add(step)) }
 }
 
-/// Works like `scalar::least_differences`. Panics without AVX2.
-pub(super) fn least_differences(row: &[u16], others: &[u16], sums: &mut [u32]) {
+/// Works like `scalar::sad_u16`. Panics without AVX2.
+pub(super) fn sad_u16(row: &[u16], others: &[u16], sums: &mut [u32]) {
     assert!(is_x86_feature_detected!("avx2"), "this machine has no AVX2");
     // SAFETY: the assertion above ensures AVX2, the only requirement of the callee.
-    unsafe { least_differences_avx2(row.as_chunks().0, others, sums) }
+    unsafe { sad_u16_avx2(row.as_chunks().0, others, sums) }
 }
 
 #[target_feature(enable = "avx2")]
-fn least_differences_avx2(row: &[[u16; LANES]], others: &[u16], sums: &mut [u32]) {
+fn sad_u16_avx2(row: &[[u16; LANES]], others: &[u16], sums: &mut [u32]) {
     let ones = _mm256_set1_epi16(1);
     let others = others.as_chunks().0.chunks_exact(row.len().max(1));
     for (sum, other) in sums.iter_mut().zip(others) {

@@ -10,10 +10,10 @@
 use std::arch::x86_64::*;
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::group::{BLOCK, Block};
+use crate::analysis::distance::group::{BLOCK_BYTES, Block};
 
 /// Number of 64-byte loads per block.
-const STEPS: usize = BLOCK / 64;
+const STEPS: usize = BLOCK_BYTES / 64;
 
 /// Works like `scalar::sad_tile`. Panics without AVX-512 BW.
 pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
@@ -27,20 +27,20 @@ pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
 
 #[target_feature(enable = "avx512f,avx512bw")]
 fn sad_tile_avx512(tile: Tile<'_>, sums: &mut SadTile) {
-    *sums = tile.apart();
+    *sums = tile.disjoint_sums();
     // Groups are padded to 48 sprites, so all four rows and columns exist.
-    let corners = tile.corners::<4, 4>();
+    let subtiles = tile.subtiles::<4, 4>();
     for block in 0..tile.rows.n_blocks() {
-        for &[row, column] in &corners {
+        for &[row, column] in &subtiles {
             let pairs = [&(row..row + 4), &(column..column + 4)];
-            if !tile.meet(block, pairs) {
+            if !tile.overlap(block, pairs) {
                 continue;
             }
             let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
             let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
             for (r, totals) in sad_4x4(a, b).into_iter().enumerate() {
                 for (k, total) in totals.into_iter().enumerate() {
-                    tile.put(block, [row + r, column + k], total, sums);
+                    tile.correct(block, [row + r, column + k], total, sums);
                 }
             }
         }

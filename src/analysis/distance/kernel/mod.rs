@@ -27,17 +27,17 @@ pub(super) struct Tile<'a> {
     pub(super) wanted: &'a Wanted,
 }
 
-/// Number of values that [`least_differences`] processes at a time.
+/// Number of values that [`sad_u16`] processes at a time.
 pub(super) const LANES: usize = 16;
 
 /// Writes the sums of absolute differences between one row of values and each of many rows.
 ///
 /// Values are below 2^15. All rows have the same length, a multiple of [`LANES`]. Sums saturate at 32 bits.
-pub(super) fn least_differences(cpu: Level, row: &[u16], others: &[u16], sums: &mut [u32]) {
+pub(super) fn sad_u16(cpu: Level, row: &[u16], others: &[u16], sums: &mut [u32]) {
     match cpu {
         #[cfg(target_arch = "x86_64")]
-        Level::Avx2 | Level::Avx512 => avx2::least_differences(row, others, sums),
-        _ => scalar::least_differences(row, others, sums),
+        Level::Avx2 | Level::Avx512 => avx2::sad_u16(row, others, sums),
+        _ => scalar::sad_u16(row, others, sums),
     }
 }
 
@@ -45,14 +45,14 @@ pub(super) fn least_differences(cpu: Level, row: &[u16], others: &[u16], sums: &
 pub(super) type Wanted = [u64; GROUP];
 
 /// Returns all pairs of two groups.
-pub(super) fn all(rows: Group<'_>, columns: Group<'_>) -> Wanted {
+pub(super) fn all_pairs(rows: Group<'_>, columns: Group<'_>) -> Wanted {
     let bits = (1 << columns.n_sprites) - 1;
     std::array::from_fn(|row| if row < rows.n_sprites { bits } else { 0 })
 }
 
 /// Returns the pairs with column >= row of a group with itself, for a tile on the diagonal.
-pub(super) fn upper(rows: Group<'_>, columns: Group<'_>) -> Wanted {
-    let mut wanted = all(rows, columns);
+pub(super) fn upper_triangle(rows: Group<'_>, columns: Group<'_>) -> Wanted {
+    let mut wanted = all_pairs(rows, columns);
     (0..)
         .zip(&mut wanted)
         .for_each(|(row, bits)| *bits &= u64::MAX << row);
@@ -61,7 +61,7 @@ pub(super) fn upper(rows: Group<'_>, columns: Group<'_>) -> Wanted {
 
 impl Tile<'_> {
     /// Returns the corners of the subtiles of `R` rows and `C` columns that contain a needed pair.
-    fn corners<const R: usize, const C: usize>(&self) -> Vec<[usize; 2]> {
+    fn subtiles<const R: usize, const C: usize>(&self) -> Vec<[usize; 2]> {
         let rows = (0..self.rows.n_sprites).step_by(R);
         rows.flat_map(|row| {
             let wanted = self.wanted[row..row + R].iter().fold(0, |a, b| a | b);
@@ -82,25 +82,25 @@ impl Tile<'_> {
 
     /// Returns d of all pairs as if no two sprites had content in the same block. d is then the sum of both
     /// totals.
-    fn apart(&self) -> SadTile {
+    fn disjoint_sums(&self) -> SadTile {
         let (rows, columns) = (self.rows.totals(), self.columns.totals());
         rows.map(|row| columns.map(|column| row + column))
     }
 
     /// Returns whether a block has content in some of the given rows and in some of the given columns.
     #[inline]
-    fn meet(&self, block: usize, [rows, columns]: [&Range<usize>; 2]) -> bool {
+    fn overlap(&self, block: usize, [rows, columns]: [&Range<usize>; 2]) -> bool {
         let filled = |group: Group<'_>, sprites: &Range<usize>| {
             group.filled(block) >> sprites.start & ((1 << sprites.len()) - 1) != 0
         };
         filled(self.rows, rows) && filled(self.columns, columns)
     }
 
-    /// Replaces the contribution of one block to a pair, computed by `apart`, by its actual difference `d`.
+    /// Replaces the contribution of one block to a pair, computed by `disjoint_sums`, by its actual difference `d`.
     #[inline]
-    fn put(&self, block: usize, [row, column]: [usize; 2], d: u64, sums: &mut SadTile) {
-        let apart = self.rows.sum(block, row) + self.columns.sum(block, column);
-        sums[row][column] = sums[row][column] + d - u64::from(apart);
+    fn correct(&self, block: usize, [row, column]: [usize; 2], d: u64, sums: &mut SadTile) {
+        let disjoint = self.rows.sum(block, row) + self.columns.sum(block, column);
+        sums[row][column] = sums[row][column] + d - u64::from(disjoint);
     }
 }
 

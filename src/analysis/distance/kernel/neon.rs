@@ -7,10 +7,10 @@
 use std::arch::aarch64::*;
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::group::{BLOCK, Block};
+use crate::analysis::distance::group::{BLOCK_BYTES, Block};
 
 /// Number of 16-byte loads per block.
-const STEPS: usize = BLOCK / 16;
+const STEPS: usize = BLOCK_BYTES / 16;
 
 /// Works like `scalar::sad_tile`.
 pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
@@ -20,20 +20,20 @@ pub(super) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
 
 #[target_feature(enable = "neon")]
 fn sad_tile_neon(tile: Tile<'_>, sums: &mut SadTile) {
-    *sums = tile.apart();
+    *sums = tile.disjoint_sums();
     // Groups are padded to 48 sprites, so both rows and all four columns exist.
-    let corners = tile.corners::<2, 4>();
+    let subtiles = tile.subtiles::<2, 4>();
     for block in 0..tile.rows.n_blocks() {
-        for &[row, column] in &corners {
+        for &[row, column] in &subtiles {
             let pairs = [&(row..row + 2), &(column..column + 4)];
-            if !tile.meet(block, pairs) {
+            if !tile.overlap(block, pairs) {
                 continue;
             }
             let a = std::array::from_fn(|k| tile.rows.block(block, row + k));
             let b = std::array::from_fn(|k| tile.columns.block(block, column + k));
             for (r, totals) in sad_2x4(a, b).into_iter().enumerate() {
                 for (k, total) in totals.into_iter().enumerate() {
-                    tile.put(block, [row + r, column + k], total.into(), sums);
+                    tile.correct(block, [row + r, column + k], total.into(), sums);
                 }
             }
         }

@@ -5,9 +5,9 @@ use crate::analysis::distance::group::Block;
 
 /// Adds d of every needed pair to `sums`.
 pub(in crate::analysis::distance) fn sad_tile(tile: Tile<'_>, sums: &mut SadTile) {
-    let corners = tile.corners::<1, 1>();
+    let subtiles = tile.subtiles::<1, 1>();
     for block in 0..tile.rows.n_blocks() {
-        for &[row, column] in &corners {
+        for &[row, column] in &subtiles {
             let (a, b) = (
                 tile.rows.block(block, row),
                 tile.columns.block(block, column),
@@ -25,11 +25,7 @@ pub(in crate::analysis::distance) fn sad_block(a: &Block, b: &Block) -> u64 {
 }
 
 /// Writes the sums of |a - b| between one row of values and each of many rows.
-pub(in crate::analysis::distance) fn least_differences(
-    row: &[u16],
-    others: &[u16],
-    sums: &mut [u32],
-) {
+pub(in crate::analysis::distance) fn sad_u16(row: &[u16], others: &[u16], sums: &mut [u32]) {
     for (sum, other) in sums.iter_mut().zip(others.chunks_exact(row.len().max(1))) {
         let differences = row.iter().zip(other).map(|(a, b)| a.abs_diff(*b));
         *sum = differences.fold(0, |sum, d| sum.saturating_add(d.into()));

@@ -1,55 +1,55 @@
 //! Selects the distances that the search for transitions needs (docs/explanation/algorithms.md, "Distances").
 //!
 //! A transition joins only clips that pass the gate. It is kept only if it is a local minimum among all its
-//! neighbors, whether these pass the gate or not. The search therefore asks for the pairs that pass. Around
+//! neighbors, whether these pass the gate or not. The search therefore requests the pairs that pass. Around
 //! each of these that is below the limit, it also computes the neighbors. The local minima are then the same
 //! as with all distances.
 
 use super::marks::Marks;
-use super::minima::REACH;
+use super::minima::RADIUS;
 
 /// Tells which pairs of clips need their distance.
-pub trait Asked: Sync {
+pub trait PairFilter: Sync {
     /// Marks the needed pairs of clip `i`: entry k of `row` is the pair (i, i + k).
     fn mark(&self, i: usize, row: &mut Marks);
 
     /// Returns the distance, in clips, within which neighbors of a needed pair compete with it.
-    fn reach(&self) -> usize {
-        REACH
+    fn radius(&self) -> usize {
+        RADIUS
     }
 }
 
-/// Asks for every distance.
-pub struct Everything;
+/// Requests every distance.
+pub struct AllPairs;
 
-impl Asked for Everything {
+impl PairFilter for AllPairs {
     fn mark(&self, _: usize, row: &mut Marks) {
         row.mark_all();
     }
 
-    fn reach(&self) -> usize {
+    fn radius(&self) -> usize {
         0
     }
 }
 
-/// Returns the pairs within `reach` of the pairs in `near`, without those in `asked`. Both hold successive
+/// Returns the pairs within `radius` of the pairs in `near`, without those in `requested`. Both hold successive
 /// clips.
-pub(super) fn competing(near: &[Marks], asked: &[Marks], reach: usize) -> Vec<Marks> {
-    let reach = reach as isize;
-    let of_clip = |(clip, asked): (usize, &Marks)| {
-        let mut row = Marks::none(asked.len());
-        for other in (-reach..=reach).filter(|_| reach > 0) {
+pub(super) fn neighbors(near: &[Marks], requested: &[Marks], radius: usize) -> Vec<Marks> {
+    let radius = radius as isize;
+    let of_clip = |(clip, requested): (usize, &Marks)| {
+        let mut row = Marks::none(requested.len());
+        for other in (-radius..=radius).filter(|_| radius > 0) {
             let Some(near) = clip.checked_add_signed(other).and_then(|at| near.get(at)) else {
                 continue;
             };
             // Rows are indexed by offset from their clip, so the same column is shifted by the difference of
             // the clips.
-            (-reach..=reach).for_each(|column| row.add(near, column - other));
+            (-radius..=radius).for_each(|column| row.union(near, column - other));
         }
-        row.drop(asked);
+        row.subtract(requested);
         row
     };
-    asked.iter().enumerate().map(of_clip).collect()
+    requested.iter().enumerate().map(of_clip).collect()
 }
 
 #[cfg(test)]
@@ -57,17 +57,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_that_a_near_pair_competes_with_is_looked_at_but_for_what_was_already() {
+    fn neighbors_of_a_near_pair_are_found_without_the_requested_pairs() {
         let n = 8;
         for pair in [(0, 7), (3, 5), (4, 4), (6, 7)] {
             let mut near: Vec<Marks> = (0..n).map(|i| Marks::none(n - i)).collect();
             near[pair.0].mark(pair.1 - pair.0);
-            let mut asked = near.clone();
-            asked[2].mark(1);
-            let found = competing(&near, &asked, REACH);
+            let mut requested = near.clone();
+            requested[2].mark(1);
+            let found = neighbors(&near, &requested, RADIUS);
             for (i, row) in found.iter().enumerate() {
                 let wanted = |&k: &usize| {
-                    let near = i.abs_diff(pair.0) <= REACH && (i + k).abs_diff(pair.1) <= REACH;
+                    let near = i.abs_diff(pair.0) <= RADIUS && (i + k).abs_diff(pair.1) <= RADIUS;
                     near && (i, i + k) != pair && (i, k) != (2, 1)
                 };
                 let expected: Vec<usize> = (0..n - i).filter(wanted).collect();
@@ -78,7 +78,7 @@ mod tests {
                 );
             }
             assert!(
-                competing(&near, &asked, 0)
+                neighbors(&near, &requested, 0)
                     .iter()
                     .all(|row| row.ones().count() == 0)
             );

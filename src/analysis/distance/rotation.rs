@@ -28,7 +28,7 @@ pub(super) struct Canvas {
 
 impl Canvas {
     /// Returns the smallest canvas, in multiples of 8 pixels, that fits every sprite with a known heading.
-    pub(super) fn around(sprites: &Sprites, poses: &Poses) -> Canvas {
+    pub(super) fn new(sprites: &Sprites, poses: &Poses) -> Canvas {
         let (w, h) = (sprites.width() as usize, sprites.height() as usize);
         let most = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
         let halves = |(frame_idx, pose): (usize, &Pose)| {
@@ -36,7 +36,7 @@ impl Canvas {
                 return [0.0; 2];
             };
             let (c, s) = (libm::cos(heading), libm::sin(heading));
-            let corners = outline(&sprites.sprite(frame_idx), w).into_iter();
+            let corners = row_corners(&sprites.sprite(frame_idx), w).into_iter();
             let turned = corners.map(|corner| {
                 let (x, y) = (corner[0] - w as f64 / 2.0, corner[1] - h as f64 / 2.0);
                 [(c * x + s * y).abs(), (c * y - s * x).abs()]
@@ -56,7 +56,7 @@ impl Canvas {
     }
 
     /// Rotates a premultiplied sprite to heading 0. Writes a blank sprite when the heading is unknown.
-    pub(super) fn turn(&self, sprite: &[u8], heading_rad: Option<f64>, out: &mut [u8]) {
+    pub(super) fn rotate(&self, sprite: &[u8], heading_rad: Option<f64>, out: &mut [u8]) {
         let Some(heading_rad) = heading_rad else {
             out.fill(0);
             return;
@@ -102,7 +102,7 @@ impl Canvas {
 }
 
 /// Returns the outer corners of the opaque pixels in each row. Their convex hull covers all opaque pixels.
-fn outline(sprite: &[u8], width: usize) -> Vec<[f64; 2]> {
+fn row_corners(sprite: &[u8], width: usize) -> Vec<[f64; 2]> {
     let mut corners = Vec::new();
     for (y, row) in sprite.as_chunks::<4>().0.chunks_exact(width).enumerate() {
         let first = row.iter().position(|pixel| pixel[3] > 0);
