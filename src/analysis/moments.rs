@@ -8,7 +8,7 @@ use crate::geometry::Rect;
 use crate::raster::Mask;
 
 /// Least ratio of the eigenvalues for an axis; rounder silhouettes have none. Free choice.
-const ROUND: f64 = 1.05;
+const MIN_EIGENVALUE_RATIO: f64 = 1.05;
 
 /// Moments of one silhouette.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,7 +71,7 @@ pub fn moments(rect: Rect, weights: &[u8]) -> Option<Moments> {
     let (large, small) = ((mu20 + mu02 + root) / 2.0, (mu20 + mu02 - root) / 2.0);
     let eigenvalue_ratio = large / small.max(1e-9);
     let angle = 0.5 * libm::atan2(2.0 * mu11, mu20 - mu02);
-    let major_rad = (eigenvalue_ratio >= ROUND).then_some(angle);
+    let major_rad = (eigenvalue_ratio >= MIN_EIGENVALUE_RATIO).then_some(angle);
     let (c, s) = (libm::cos(angle), libm::sin(angle));
     let mut third = [0.0; 2];
     for (x, y, f) in weighed() {
@@ -97,19 +97,15 @@ pub fn moments(rect: Rect, weights: &[u8]) -> Option<Moments> {
 /// Returns the extent of the mask along a direction, pixels; 0 for an empty mask.
 pub fn extent_px(mask: &Mask, direction_rad: f64) -> f64 {
     let (c, s) = (libm::cos(direction_rad), libm::sin(direction_rad));
-    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
     for (k, _) in mask.bits.iter().enumerate().filter(|&(_, &bit)| bit == 1) {
         let (x, y) = (k % mask.width(), k / mask.width());
         let along = x as f64 * c + y as f64 * s;
-        least = least.min(along);
-        most = most.max(along);
+        min = min.min(along);
+        max = max.max(along);
     }
     // Adds one pixel, because pixel centers were compared. On a diagonal, a pixel is up to 1.41 wide.
-    if most >= least {
-        most - least + 1.0
-    } else {
-        0.0
-    }
+    if max >= min { max - min + 1.0 } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -142,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn the_major_axis_is_found_at_every_angle_even_upright() {
+    fn the_major_axis_is_found_at_every_angle() {
         for k in -8..=8 {
             let angle = f64::from(k) * PI / 17.0;
             let (rect, weights) = ellipse(angle);
@@ -158,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn skew_is_negative_where_the_thick_end_is_ahead() {
+    fn skew_is_negative_with_the_thick_end_ahead() {
         // The thick end contains the mass, so the long tail of the distribution points backward.
         let (rect, weights) = ellipse(0.0);
         assert!(moments(rect, &weights).expect("not empty").skew[0] < -0.05);

@@ -39,15 +39,15 @@ pub fn playback(transitions: &[Transition], shown: &[bool], clip_frames: usize) 
 /// at a gap in the component. Playback leaves a patch only at its end and enters it only at its start, so
 /// `next` lists all successors.
 pub fn patches(playback: &Playback) -> Vec<Patch> {
-    let leaves: BTreeSet<u32> = playback.jumps.iter().map(|jump| jump.from).collect();
-    let enters: BTreeSet<u32> = playback.jumps.iter().map(|jump| jump.to).collect();
+    let jump_sources: BTreeSet<u32> = playback.jumps.iter().map(|jump| jump.from).collect();
+    let jump_targets: BTreeSet<u32> = playback.jumps.iter().map(|jump| jump.to).collect();
     let mut patches: Vec<Patch> = Vec::new();
     for &frame in &playback.component {
         match patches.last_mut() {
             Some(patch)
                 if patch.frames.end == frame
-                    && !enters.contains(&frame)
-                    && !leaves.contains(&(frame - 1)) =>
+                    && !jump_targets.contains(&frame)
+                    && !jump_sources.contains(&(frame - 1)) =>
             {
                 patch.frames.end = frame + 1;
             }
@@ -150,30 +150,30 @@ fn largest_component(graph: &Graph, n_frames: usize) -> Vec<u32> {
 
 /// Returns every strongly connected component (Tarjan 1972), with an explicit stack instead of recursion.
 fn strong_components(graph: &Graph, n_states: u32) -> Vec<Vec<u32>> {
-    const UNSEEN: u32 = u32::MAX;
-    let mut order = vec![UNSEEN; n_states as usize];
+    const UNVISITED: u32 = u32::MAX;
+    let mut order = vec![UNVISITED; n_states as usize];
     let mut lowest = vec![0u32; n_states as usize];
-    let mut on_stack = vec![false; n_states as usize];
+    let mut is_on_stack = vec![false; n_states as usize];
     let (mut stack, mut path) = (Vec::new(), Vec::new());
-    let (mut n_seen, mut components) = (0, Vec::new());
+    let (mut n_visited, mut components) = (0, Vec::new());
     for root in 0..n_states {
-        if order[root as usize] != UNSEEN {
+        if order[root as usize] != UNVISITED {
             continue;
         }
         path.push((root, 0));
         while let Some((state, edge)) = path.last_mut() {
             let s = *state as usize;
             if *edge == 0 {
-                (order[s], lowest[s]) = (n_seen, n_seen);
-                n_seen += 1;
+                (order[s], lowest[s]) = (n_visited, n_visited);
+                n_visited += 1;
                 stack.push(*state);
-                on_stack[s] = true;
+                is_on_stack[s] = true;
             }
             let successor = graph.successors(*state).get(*edge).copied();
             *edge += 1;
             match successor {
-                Some(next) if order[next as usize] == UNSEEN => path.push((next, 0)),
-                Some(next) if on_stack[next as usize] => {
+                Some(next) if order[next as usize] == UNVISITED => path.push((next, 0)),
+                Some(next) if is_on_stack[next as usize] => {
                     lowest[s] = lowest[s].min(order[next as usize]);
                 }
                 Some(_) => {}
@@ -184,7 +184,7 @@ fn strong_components(graph: &Graph, n_states: u32) -> Vec<Vec<u32>> {
                         lowest[parent] = lowest[parent].min(lowest[s]);
                     }
                     if lowest[s] == order[s] {
-                        components.push(pop_component(&mut stack, &mut on_stack, s as u32));
+                        components.push(pop_component(&mut stack, &mut is_on_stack, s as u32));
                     }
                 }
             }
@@ -194,11 +194,11 @@ fn strong_components(graph: &Graph, n_states: u32) -> Vec<Vec<u32>> {
 }
 
 /// Pops the states from the top of the stack down to `root`.
-fn pop_component(stack: &mut Vec<u32>, on_stack: &mut [bool], root: u32) -> Vec<u32> {
+fn pop_component(stack: &mut Vec<u32>, is_on_stack: &mut [bool], root: u32) -> Vec<u32> {
     let at = stack.iter().rposition(|&state| state == root);
     let component = stack.split_off(at.expect("a root lies on the stack"));
     for &state in &component {
-        on_stack[state as usize] = false;
+        is_on_stack[state as usize] = false;
     }
     component
 }
@@ -208,7 +208,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn alike(from: u32, to: u32, mirrored: bool, distance: u64) -> Transition {
+    fn transition(from: u32, to: u32, mirrored: bool, distance: u64) -> Transition {
         Transition {
             from,
             to,
@@ -228,17 +228,17 @@ mod tests {
     }
 
     #[test]
-    fn clips_are_joined_in_their_middle() {
-        let playback = playback(&[alike(2, 10, false, 7)], &[true; 20], 4);
+    fn jumps_lie_in_the_middle_of_the_clips() {
+        let playback = playback(&[transition(2, 10, false, 7)], &[true; 20], 4);
         // h = 2: frame 3 jumps to 12, and frame 11 to 4. Only the jump back closes a loop.
         assert_eq!(playback.component, (4..=11).collect::<Vec<u32>>());
         assert_eq!(playback.jumps, [jump(11, 4, 7)]);
     }
 
     #[test]
-    fn clips_of_one_frame_follow_schoedls_rule() {
+    fn clips_of_one_frame_follow_the_rule_of_schoedl() {
         let found = playback(
-            &[alike(1, 5, false, 3), alike(0, 6, false, 3)],
+            &[transition(1, 5, false, 3), transition(0, 6, false, 3)],
             &[true; 9],
             1,
         );
@@ -248,7 +248,7 @@ mod tests {
 
     #[test]
     fn frames_after_the_last_transition_and_before_the_first_are_left_out() {
-        let pairs = [alike(5, 10, false, 1), alike(20, 25, false, 1)];
+        let pairs = [transition(5, 10, false, 1), transition(20, 25, false, 1)];
         let found = playback(&pairs, &[true; 30], 1);
         // The claim of Okabe et al. fails: no path leads back from 20 to a frame below. The earlier of two
         // equally long loops is kept.
@@ -256,24 +256,28 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_that_cannot_be_shown_is_never_played_across() {
+    fn playback_never_crosses_a_frame_that_cannot_be_shown() {
         let mut shown = [true; 20];
         shown[7] = false;
-        let found = playback(&[alike(4, 12, false, 1)], &shown, 2);
+        let found = playback(&[transition(4, 12, false, 1)], &shown, 2);
         assert_eq!(found, Playback::default());
     }
 
     #[test]
     fn of_equal_jumps_the_cheapest_is_kept() {
-        let found = playback(&[alike(3, 3, true, 9), alike(3, 3, true, 5)], &[true; 9], 4);
+        let found = playback(
+            &[transition(3, 3, true, 9), transition(3, 3, true, 5)],
+            &[true; 9],
+            4,
+        );
         assert!(found.jumps.is_empty(), "4 -> 5 mirrored is no loop");
-        let pairs = [alike(2, 6, false, 9), alike(2, 6, false, 5)];
+        let pairs = [transition(2, 6, false, 9), transition(2, 6, false, 5)];
         assert_eq!(playback(&pairs, &[true; 9], 2).jumps, [jump(6, 3, 5)]);
     }
 
     #[test]
-    fn patches_end_where_a_jump_leaves_and_begin_where_one_arrives() {
-        let pairs = [alike(0, 6, false, 1), alike(3, 9, false, 1)];
+    fn patches_end_at_jump_sources_and_begin_at_jump_targets() {
+        let pairs = [transition(0, 6, false, 1), transition(3, 9, false, 1)];
         let found = playback(&pairs, &[true; 12], 2);
         let patches: Vec<_> = patches(&found)
             .into_iter()
@@ -292,7 +296,7 @@ mod tests {
     fn footage() -> impl Strategy<Value = (Vec<bool>, Vec<Transition>, usize)> {
         (2usize..14, 1usize..5).prop_flat_map(|(n, f)| {
             let pair = (0..n as u32, 0..n as u32, any::<bool>(), 1u64..9)
-                .prop_map(|(a, b, mirrored, d)| alike(a.min(b), a.max(b), mirrored, d));
+                .prop_map(|(a, b, mirrored, d)| transition(a.min(b), a.max(b), mirrored, d));
             let shown = proptest::collection::vec(proptest::bool::weighted(0.9), n);
             (shown, proptest::collection::vec(pair, 0..6), Just(f))
         })
@@ -301,8 +305,8 @@ mod tests {
     /// Returns the successors of (frame, side), from the definition.
     fn after(state: (u32, bool), jumps: &[Jump], shown: &[bool]) -> Vec<(u32, bool)> {
         let (frame, side) = state;
-        let on = is_shown(shown, frame) && is_shown(shown, frame + 1);
-        let mut states: Vec<_> = on.then_some((frame + 1, side)).into_iter().collect();
+        let continues = is_shown(shown, frame) && is_shown(shown, frame + 1);
+        let mut states: Vec<_> = continues.then_some((frame + 1, side)).into_iter().collect();
         let leaving = jumps.iter().filter(|jump| jump.from == frame);
         states.extend(leaving.map(|jump| (jump.to, side ^ jump.mirrored)));
         states
@@ -341,13 +345,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_component_is_the_largest_that_a_plain_search_finds((shown, pairs, f) in footage()) {
+        fn the_component_equals_that_of_a_brute_force_search((shown, pairs, f) in footage()) {
             let found = playback(&pairs, &shown, f);
             prop_assert_eq!(found.component, component_by_force(&pairs, &shown, f));
         }
 
         #[test]
-        fn within_the_component_playback_never_ends_and_never_leaves((shown, pairs, f) in footage()) {
+        fn playback_in_the_component_never_ends((shown, pairs, f) in footage()) {
             let found = playback(&pairs, &shown, f);
             for &frame in &found.component {
                 let next = after((frame, false), &found.jumps, &shown);

@@ -12,12 +12,12 @@ use crate::order::median;
 /// Margin added to the width and height of the largest silhouette, pixels. Free choice.
 const MARGIN_PX: f64 = 4.0;
 /// Least median area of an animal for sprites, pixels. Free choice.
-const LEAST_AREA_PX: f64 = 24.0;
+const MIN_AREA_PX: f64 = 24.0;
 /// The sides of a sprite are multiples of this, pixels. Free choice.
-const MULTIPLE: u32 = 8;
+const SIZE_STEP: u32 = 8;
 
 /// Smallest and greatest scale of a sprite. Free choice.
-const SCALES: [f64; 2] = [0.25, 1.5];
+const SCALE_RANGE: [f64; 2] = [0.25, 1.5];
 /// Span of the running median of the height, seconds: fins open and close. Free choice.
 const HEIGHT_SPAN_S: f64 = 0.5;
 
@@ -27,9 +27,9 @@ const HEIGHT_SPAN_S: f64 = 0.5;
 /// 1.
 pub fn scales(poses: &Poses) -> Vec<f64> {
     let frames = &poses.frames;
-    let reach = (HEIGHT_SPAN_S * poses.fps / 2.0).round() as usize;
-    let near = |frame: usize| {
-        let around = frame.saturating_sub(reach)..(frame + reach + 1).min(frames.len());
+    let half_span = (HEIGHT_SPAN_S * poses.fps / 2.0).round() as usize;
+    let median_height_px = |frame: usize| {
+        let around = frame.saturating_sub(half_span)..(frame + half_span + 1).min(frames.len());
         median(frames[around].iter().filter_map(|pose| pose.height_px))
     };
     let depth = |frame: usize| {
@@ -37,16 +37,20 @@ pub fn scales(poses: &Poses) -> Vec<f64> {
         Some(poses.camera?.apparent_from_true_depth_m(z_m))
     };
     // A quantity that grows as the animal appears smaller.
-    let is_deep = frames.iter().any(|pose| pose.position_m.is_some());
-    let farness: Vec<Option<f64>> = (0..frames.len())
-        .map(|frame| match is_deep {
-            true => depth(frame),
-            false => near(frame).map(|height_px| 1.0 / height_px),
-        })
-        .collect();
-    let usual = median(farness.iter().flatten().copied()).unwrap_or(1.0);
+    let has_depth = frames.iter().any(|pose| pose.position_m.is_some());
+    let farness = |frame: usize| {
+        if has_depth {
+            depth(frame)
+        } else {
+            median_height_px(frame).map(|height_px| 1.0 / height_px)
+        }
+    };
+    let farness: Vec<Option<f64>> = (0..frames.len()).map(farness).collect();
+    let typical = median(farness.iter().flatten().copied()).unwrap_or(1.0);
     let scale = |far: &Option<f64>| {
-        let scale = far.map_or(1.0, |far| (far / usual).clamp(SCALES[0], SCALES[1]));
+        let scale = far.map_or(1.0, |far| {
+            (far / typical).clamp(SCALE_RANGE[0], SCALE_RANGE[1])
+        });
         (scale * 1e5).round() / 1e5
     };
     farness.iter().map(scale).collect()
@@ -65,13 +69,12 @@ pub fn align(
 ) -> Sprites {
     let scale = |frame_idx: usize| scales.as_ref().map_or(1.0, |scales| scales[frame_idx]);
     let size = common_size(&track.frames, view, &scale);
-    let of = |t: &Tracked| {
-        let sighting = t.sighting.as_ref()?;
-        t.plate_idx
-            .is_some_and(&is_in_light)
-            .then(|| matte(sighting))
+    let matte_in_light = |tracked: &Tracked| {
+        let sighting = tracked.sighting.as_ref()?;
+        let is_in_light = tracked.plate_idx.is_some_and(&is_in_light);
+        is_in_light.then(|| matte(sighting))
     };
-    let mattes = track.frames.iter().map(of).collect();
+    let mattes = track.frames.iter().map(matte_in_light).collect();
     Sprites::of(size, mattes, scales, Arc::clone(&track.scratch))
 }
 
@@ -89,46 +92,36 @@ fn matte(sighting: &Sighting) -> Matte {
 /// Returns whether the animal's median area is too small for sprites.
 pub fn is_too_small(track: &[Tracked]) -> bool {
     let sightings = track.iter().filter_map(|t| t.sighting.as_ref());
-    let mut areas_px: Vec<f64> = sightings.map(|s| s.moments.area_px).collect();
-    areas_px.sort_by(f64::total_cmp);
-    areas_px
-        .get(areas_px.len() / 2)
-        .is_some_and(|&area_px| area_px < LEAST_AREA_PX)
+    median(sightings.map(|s| s.moments.area_px)).is_some_and(|area_px| area_px < MIN_AREA_PX)
 }
 
 /// Returns missing sprites for all frames, for an animal that is too small.
-pub fn none(n_frames: usize) -> Sprites {
-    Sprites::missing(MULTIPLE, MULTIPLE, n_frames)
+pub fn missing(n_frames: usize) -> Sprites {
+    Sprites::missing(SIZE_STEP, SIZE_STEP, n_frames)
 }
 
 fn common_size(track: &[Tracked], view: View, scale: &dyn Fn(usize) -> f64) -> [u32; 2] {
-    let seen = |(idx, tracked): (usize, &Tracked)| {
-        let sighting = tracked.sighting.as_ref()?;
-        Some((sighting.cut, sighting.reach_px.map(|px| px * scale(idx))))
+    let largest_extent_px = |include: &dyn Fn(&Sighting) -> bool| {
+        let mut largest = [0.0f64; 3];
+        for (frame_idx, tracked) in track.iter().enumerate() {
+            if let Some(sighting) = tracked.sighting.as_ref().filter(|s| include(s)) {
+                for (largest, extent_px) in largest.iter_mut().zip(sighting.reach_px) {
+                    *largest = largest.max(extent_px * scale(frame_idx));
+                }
+            }
+        }
+        largest
     };
-    let all = || track.iter().enumerate().filter_map(seen);
-    let reach = |sightings: &mut dyn Iterator<Item = (bool, [f64; 3])>| {
-        sightings
-            .map(|seen| seen.1)
-            .fold([0.0f64; 3], |most, reach| {
-                [
-                    most[0].max(reach[0]),
-                    most[1].max(reach[1]),
-                    most[2].max(reach[2]),
-                ]
-            })
-    };
-    let whole = reach(&mut all().filter(|seen| !seen.0));
-    // An animal that is cut in all frames has sprites too.
-    let [x, y, radius] = if whole[2] > 0.0 {
-        whole
-    } else {
-        reach(&mut all())
-    };
-    let side = |reach: f64| ((2.0 * reach + MARGIN_PX).ceil() as u32).next_multiple_of(MULTIPLE);
+    let mut extent_px = largest_extent_px(&|sighting| !sighting.cut);
+    if extent_px[2] <= 0.0 {
+        // An animal that is cut in all frames has sprites too.
+        extent_px = largest_extent_px(&|_| true);
+    }
+    let [x, y, radius] =
+        extent_px.map(|px| ((2.0 * px + MARGIN_PX).ceil() as u32).next_multiple_of(SIZE_STEP));
     match view {
-        View::Side => [side(x), side(y)],
-        View::Top => [side(radius); 2],
+        View::Side => [x, y],
+        View::Top => [radius; 2],
     }
 }
 
@@ -154,8 +147,8 @@ mod tests {
     }
 
     #[test]
-    fn who_looks_half_as_tall_is_enlarged_but_not_beyond_the_limit_and_who_was_not_seen_stays() {
-        let of_height = |height_px| Pose {
+    fn small_animals_are_enlarged_up_to_the_limit() {
+        let pose_of_height = |height_px| Pose {
             height_px,
             ..Pose::default()
         };
@@ -168,12 +161,12 @@ mod tests {
             Some(40.0),
             Some(40.0),
         ];
-        let frames = heights.map(of_height).to_vec();
+        let frames = heights.map(pose_of_height).to_vec();
         assert_eq!(scales(&poses(frames)), [1.0, 1.25, 0.5, 1.5, 1.0, 1.0, 1.0]);
     }
 
     #[test]
-    fn where_depth_was_measured_it_decides_and_not_the_fins() {
+    fn measured_depth_decides_instead_of_height() {
         let at = |z_m| Pose {
             position_m: Some([0.0, 0.0, z_m]),
             height_px: Some(1000.0 * z_m * z_m),

@@ -92,7 +92,7 @@ impl Format {
 
 fn write_numbers(distances: &Distances<'_>, path: &Path) -> Result<(), Error> {
     npy::check(distances.pixels.n_frames()).map_err(|error| Error::work(error.code(), &error))?;
-    let matrix = DistanceMatrix::of(distances, &Listener::new()).map_err(cancelled)?;
+    let matrix = DistanceMatrix::compute(distances, &Listener::new()).map_err(cancelled)?;
     let write = || {
         let mut file = BufWriter::new(File::create(path)?);
         npy::write(&matrix, &mut file)?;

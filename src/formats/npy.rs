@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn distances_beyond_32_bits_are_written_in_64() {
-        let matrix = DistanceMatrix::of_triangle(2, vec![0, 1 << 40, 0]);
+        let matrix = DistanceMatrix::from_triangle(2, vec![0, 1 << 40, 0]);
         let mut bytes = Vec::new();
         write(&matrix, &mut bytes).expect("memory takes all");
         assert!(matrix.max() > u64::from(u32::MAX));

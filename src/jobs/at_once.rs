@@ -40,7 +40,7 @@ pub async fn distances(context: &Context, library: &Library) -> Result<File, Err
             side: Side::Plain,
             cpu: Level::detect(),
         };
-        let matrix = DistanceMatrix::of(&distances, waiting);
+        let matrix = DistanceMatrix::compute(&distances, waiting);
         let Ok(matrix) = matrix else {
             return Err(Error::Cancelled);
         };

@@ -3,23 +3,23 @@
 //!
 //! The matrix is then a band, and Cholesky factorisation takes time proportional to the number of frames.
 
-/// Number of unknowns per frame.
-pub(super) const N_STATE: usize = 5;
+use super::state::N_STATE;
+
 /// Width of the band. A residual involves at most three successive frames.
-pub(super) const BAND: usize = 3 * N_STATE;
+const BAND: usize = 3 * N_STATE;
 
 /// The normal equations `H x = -g` of a sum of squares. `H` is stored by rows, each from the diagonal
 /// leftward.
-pub(super) struct Normal {
+pub(super) struct NormalEquations {
     rows: Vec<[f64; BAND]>,
     gradient: Vec<f64>,
     /// The weighted sum of squared residuals, without the factor 1/2.
     pub(super) cost: f64,
 }
 
-impl Normal {
-    pub(super) fn new(n_unknowns: usize) -> Normal {
-        Normal {
+impl NormalEquations {
+    pub(super) fn new(n_unknowns: usize) -> NormalEquations {
+        NormalEquations {
             rows: vec![[0.0; BAND]; n_unknowns],
             gradient: vec![0.0; n_unknowns],
             cost: 0.0,
@@ -29,10 +29,10 @@ impl Normal {
     /// Adds a residual with its weight. `terms` are pairs of unknown and derivative, by ascending unknown.
     pub(super) fn add(&mut self, residual: f64, weight: f64, terms: &[(usize, f64)]) {
         for (k, &(row, slope)) in terms.iter().enumerate() {
-            let pulled = weight * slope;
-            self.gradient[row] += pulled * residual;
+            let weighted_slope = weight * slope;
+            self.gradient[row] += weighted_slope * residual;
             for &(column, other) in &terms[..=k] {
-                self.rows[row][row - column] += pulled * other;
+                self.rows[row][row - column] += weighted_slope * other;
             }
         }
     }
@@ -40,21 +40,21 @@ impl Normal {
     /// Returns the step that minimises the quadratic model with `damping` times the diagonal added (Marquardt
     /// 1963).
     ///
-    /// Unknowns for which `held` returns true do not move. Returns `None` when the system is not positive
+    /// Unknowns for which `is_fixed` returns true do not move. Returns `None` when the system is not positive
     /// definite.
-    pub(super) fn step(&self, damping: f64, held: impl Fn(usize) -> bool) -> Option<Vec<f64>> {
+    pub(super) fn step(&self, damping: f64, is_fixed: impl Fn(usize) -> bool) -> Option<Vec<f64>> {
         let n = self.rows.len();
         let mut factor = self.rows.clone();
         let mut x: Vec<f64> = self.gradient.iter().map(|g| -g).collect();
         for (k, row) in factor.iter_mut().enumerate() {
             row[0] = row[0] * (1.0 + damping) + 1e-9;
-            if held(k) {
+            if is_fixed(k) {
                 *row = [0.0; BAND];
                 row[0] = 1.0;
                 x[k] = 0.0;
             } else {
                 for back in 1..BAND.min(k + 1) {
-                    if held(k - back) {
+                    if is_fixed(k - back) {
                         row[back] = 0.0;
                     }
                 }
@@ -122,7 +122,7 @@ mod tests {
             random::normal(3, &[count])
         };
         let n = 40;
-        let mut normal = Normal::new(n);
+        let mut normal = NormalEquations::new(n);
         let mut dense = vec![vec![0.0; n]; n];
         let mut right = vec![0.0; n];
         for start in 0..n - BAND + 1 {
@@ -144,10 +144,10 @@ mod tests {
             let got: f64 = (0..n).map(|j| dense[i][j] * x[j]).sum();
             assert!((got - right[i]).abs() < 1e-5, "{got} {}", right[i]);
         }
-        let held = normal.step(0.0, |k| k < 7).expect("definite");
-        assert!(held[..7].iter().all(|&v| v == 0.0));
+        let fixed = normal.step(0.0, |k| k < 7).expect("definite");
+        assert!(fixed[..7].iter().all(|&v| v == 0.0));
         for i in 7..n {
-            let got: f64 = (7..n).map(|j| dense[i][j] * held[j]).sum();
+            let got: f64 = (7..n).map(|j| dense[i][j] * fixed[j]).sum();
             assert!((got - right[i]).abs() < 1e-5);
         }
     }

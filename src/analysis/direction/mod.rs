@@ -13,41 +13,49 @@
 
 mod banded;
 mod body;
+mod cells;
 mod energy;
+mod hidden_markov;
 mod mirror;
+mod observations;
 mod shape;
 mod solve;
 mod sphere;
+mod state;
+#[cfg(test)]
+mod tests;
 
 use crate::geometry::Camera;
 use crate::library::Animal;
 use crate::order::percentile;
 
-use energy::{Energy, State};
+use body::BodyAxes;
+use energy::Energy;
+use observations::Observations;
 use shape::Shape;
 
 /// Measurements of the silhouette in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct Measurement {
     /// Centroid in the image (Nakajima et al., equation 2), pixels.
     pub centroid_px: [f64; 2],
     /// Second central moments over the area: xx, xy, yy, square pixels.
     pub covariance_px2: [f64; 3],
     /// Vertical extent from the topmost to the lowest solid pixel, pixels.
-    pub upright_px: f64,
+    pub vertical_px: f64,
     /// True where the image border cuts the silhouette. The estimate then uses the centroid only, not the
     /// moments.
     pub cut: bool,
     /// Vector in the image from the centroid to the head, pixels, from the user; `None` where the user gave
     /// none.
-    pub toward: Option<[f64; 2]>,
+    pub given_head_px: Option<[f64; 2]>,
     /// Direction in the image in which the shape of the two ends suggests the head. Its length is half the
     /// logarithm of the odds; `None` without evidence.
-    pub ends: Option<[f64; 2]>,
+    pub head_evidence: Option<[f64; 2]>,
 }
 
 /// Returns a camera with a horizontal field of view of 45 degrees, for footage from an uncalibrated camera.
-pub fn usual_camera(width_px: u32, height_px: u32) -> Camera {
+pub fn typical_camera(width_px: u32, height_px: u32) -> Camera {
     Camera {
         z_min_m: 1.0,
         pane_px_per_m: 1.2 * f64::from(width_px),
@@ -59,14 +67,11 @@ pub fn usual_camera(width_px: u32, height_px: u32) -> Camera {
 /// Returns an animal with the proportions seen in the footage and a height of 1 m.
 ///
 /// Directions computed with this animal are valid; depths and lengths are not in metres.
-pub fn usual_animal(seen: &[Option<Seen>]) -> Animal {
-    let whole = seen
-        .iter()
-        .flatten()
-        .filter(|s| !s.cut && s.upright_px > 0.0);
+pub fn typical_animal(measured: &[Option<Measurement>]) -> Animal {
+    let whole = (measured.iter().flatten()).filter(|m| !m.cut && m.vertical_px > 0.0);
     // A uniform ellipse is four standard deviations long; real bodies differ little from that.
     let mut ratios: Vec<f64> = whole
-        .map(|s| 4.0 * s.covariance_px2[0].max(0.0).sqrt() / s.upright_px)
+        .map(|m| 4.0 * m.covariance_px2[0].max(0.0).sqrt() / m.vertical_px)
         .collect();
     let length_m = percentile(&mut ratios, 0.9).unwrap_or(1.0);
     Animal {
@@ -91,154 +96,72 @@ pub struct Direction {
 }
 
 /// Number of final rounds: shape estimate, fit, mirrored turns, fit. Free choice.
-const ROUNDS: usize = 2;
-/// Longest gap between detections that is interpolated, seconds. Free choice.
-const BRIDGE_S: f64 = 0.5;
+const N_ROUNDS: usize = 2;
 
 /// Returns the direction in every frame with a detection or in a gap of at most 0.5 s.
 ///
 /// All entries are `None` when the footage has uncut silhouettes for less than one second or fewer than 8
 /// frames.
 pub fn estimate(
-    seen: &[Option<Seen>],
+    measured: &[Option<Measurement>],
     camera: &Camera,
     animal: &Animal,
     fps: f64,
 ) -> Vec<Option<Direction>> {
-    let nothing = || vec![None; seen.len()];
-    let Some(views) = Views::of(seen, camera, fps) else {
-        return nothing();
-    };
-    let Some(mut shape) = Shape::first(&views, animal) else {
-        return nothing();
-    };
+    let estimated = Observations::new(measured, camera, fps).and_then(|observations| {
+        let shape = Shape::initial(&observations, animal)?;
+        Some(estimate_observed(
+            measured.len(),
+            &observations,
+            shape,
+            camera,
+        ))
+    });
+    estimated.unwrap_or_else(|| vec![None; measured.len()])
+}
+
+fn estimate_observed(
+    n_frames: usize,
+    observations: &Observations,
+    mut shape: Shape,
+    camera: &Camera,
+) -> Vec<Option<Direction>> {
     // The first pass only learns the shape of the body. The second decoding uses that shape.
-    let mut states = sphere::decode(&views, &shape).states(&views, &shape);
-    solve::whole(&Energy::new(&views, &shape), &mut states);
-    shape = shape.learned(&views, &states);
-    let course = sphere::decode(&views, &shape);
-    states = course.states(&views, &shape);
-    for round in 0..ROUNDS {
+    let mut states = sphere::decode(observations, &shape).initial_states(observations, &shape);
+    let energy = Energy {
+        observations,
+        shape: &shape,
+    };
+    solve::minimize(&energy, &mut states);
+    shape = shape.refined(observations, &states);
+    let course = sphere::decode(observations, &shape);
+    states = course.initial_states(observations, &shape);
+    for round in 0..N_ROUNDS {
         if round > 0 {
-            shape = shape.learned(&views, &states);
+            shape = shape.refined(observations, &states);
         }
-        let energy = Energy::new(&views, &shape);
-        solve::whole(&energy, &mut states);
+        let energy = Energy {
+            observations,
+            shape: &shape,
+        };
+        solve::minimize(&energy, &mut states);
         mirror::improve(&energy, &mut states);
-        solve::whole(&energy, &mut states);
+        solve::minimize(&energy, &mut states);
     }
-    (0..seen.len())
+    (0..n_frames)
         .map(|k| {
-            let idx = k.checked_sub(views.first)?;
-            let state = states.get(idx).filter(|_| views.bridged[idx])?;
-            let forward = body::Axes::of(state.yaw(), state.pitch()).forward;
-            let [head, depth] = course.confidence(idx, forward);
-            let slope = views.frames[idx].slope;
+            let idx = k.checked_sub(observations.first)?;
+            let state = states.get(idx).filter(|_| observations.bridged[idx])?;
+            let forward = BodyAxes::new(state.yaw, state.pitch).forward;
+            let [head_confidence, depth_sign_confidence] = course.confidence(idx, forward);
+            let slope = observations.frames[idx].slope;
             Some(Direction {
-                centroid_px: [0, 1].map(|c| camera.center_px[c] + slope[c] * views.focal_px),
-                z_apparent_m: libm::exp(state.log_z()),
+                centroid_px: [0, 1].map(|c| camera.center_px[c] + slope[c] * observations.focal_px),
+                z_apparent_m: libm::exp(state.log_z),
                 forward,
-                head_confidence: head,
-                depth_sign_confidence: depth,
+                head_confidence,
+                depth_sign_confidence,
             })
         })
         .collect()
 }
-
-/// The measurements from the first detection to the last, with interpolated centroids in the gaps.
-struct Views {
-    /// Frame number in the footage of `frames[0]`.
-    first: usize,
-    frames: Vec<View>,
-    /// True for frames with a detection and for frames in a gap of at most `BRIDGE_S`.
-    bridged: Vec<bool>,
-    dt: f64,
-    focal_px: f64,
-    medium_index: f64,
-}
-
-/// The measurements of one frame in the form the estimate uses.
-#[derive(Clone, Copy)]
-struct View {
-    /// Slope of the line of sight to the centroid: (centroid - image center) / focal length.
-    slope: [f64; 2],
-    seen: bool,
-    /// Unit vector in the image toward the head, from the user.
-    toward: Option<[f64; 2]>,
-    /// Evidence for the head's side from the shape of the ends, as in [`Seen::ends`].
-    ends: Option<[f64; 2]>,
-    /// Moments and vertical extent; `None` without a detection or where the image border cuts the silhouette.
-    outline: Option<Outline>,
-}
-
-#[derive(Clone, Copy)]
-struct Outline {
-    covariance_px2: [f64; 3],
-    upright_px: f64,
-}
-
-impl Views {
-    fn of(seen: &[Option<Seen>], camera: &Camera, fps: f64) -> Option<Views> {
-        let first = seen.iter().position(Option::is_some)?;
-        let last = seen.iter().rposition(Option::is_some)?;
-        let focal_px = camera.focal_px();
-        let slope = |s: &Seen| [0, 1].map(|k| (s.centroid_px[k] - camera.center_px[k]) / focal_px);
-        let mut frames: Vec<View> = Vec::with_capacity(last + 1 - first);
-        let mut bridged = Vec::with_capacity(last + 1 - first);
-        let mut known = first;
-        for k in first..=last {
-            let Some(one) = &seen[k] else { continue };
-            if let Some(from) = frames.last().map(|v| v.slope) {
-                let (gap, to) = (k - known, slope(one));
-                for step in 1..gap {
-                    let share = step as f64 / gap as f64;
-                    frames.push(View {
-                        slope: [0, 1].map(|c| from[c] + (to[c] - from[c]) * share),
-                        seen: false,
-                        toward: None,
-                        ends: None,
-                        outline: None,
-                    });
-                    bridged.push((gap - 1) as f64 <= BRIDGE_S * fps);
-                }
-            }
-            known = k;
-            let whole = !one.cut && one.upright_px > 0.0 && one.covariance_px2[0] > 0.0;
-            frames.push(View {
-                slope: slope(one),
-                seen: true,
-                toward: one.toward.and_then(|[x, y]| {
-                    let length = libm::hypot(x, y);
-                    (length > 0.0).then(|| [x / length, y / length])
-                }),
-                ends: one.ends.filter(|_| whole),
-                outline: whole.then_some(Outline {
-                    covariance_px2: one.covariance_px2,
-                    upright_px: one.upright_px,
-                }),
-            });
-            bridged.push(true);
-        }
-        let n_whole = frames.iter().filter(|v| v.outline.is_some()).count();
-        (n_whole as f64 >= fps && n_whole >= 8).then_some(Views {
-            first,
-            frames,
-            bridged,
-            dt: 1.0 / fps,
-            focal_px,
-            medium_index: camera.medium_index,
-        })
-    }
-
-    /// Returns the weight of one frame, 0..=1. Above 30 frames a second, neighboring frames are not
-    /// independent: all frames of one second together weigh at most 30.
-    fn evidence(&self) -> f64 {
-        (30.0 * self.dt).min(1.0)
-    }
-}
-
-/// One state per frame.
-type States = Vec<State>;
-
-#[cfg(test)]
-mod tests;

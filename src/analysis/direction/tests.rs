@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use super::state::State;
 use super::*;
 use crate::random;
 
@@ -24,30 +25,37 @@ struct Truth {
 
 /// Returns `n` frames of a swimmer: uneven turns in yaw, little pitch, about one body length per second, and
 /// a beating tail.
-fn wandering(n: usize, camera: &Camera) -> (Vec<Truth>, Vec<Option<Seen>>) {
-    let mut place = [0.0, 0.0, 0.85];
+fn swimmer(n: usize, camera: &Camera) -> (Vec<Truth>, Vec<Option<Measurement>>) {
+    let mut position_m = [0.0, 0.0, 0.85];
     (0..n)
         .map(|k| {
             let t = k as f64 / 30.0;
             let yaw = 0.9 * t + 1.3 * libm::sin(0.7 * t) + 0.5 * libm::sin(1.9 * t + 1.0);
             let pitch = 0.2 * libm::sin(0.5 * t);
-            let axes = body::Axes::of(yaw, pitch);
+            let axes = BodyAxes::new(yaw, pitch);
             let speed = 0.1 + 0.03 * libm::sin(0.4 * t);
             for c in 0..3 {
-                place[c] += axes.forward[c] * speed / 30.0;
+                position_m[c] += axes.forward[c] * speed / 30.0;
             }
             let truth = Truth {
-                position_m: place,
+                position_m,
                 forward: axes.forward,
             };
-            let seen = look(&axes, place, 0.1 * libm::sin(TAU * 2.3 * t), camera, k);
-            (truth, Some(seen))
+            let measured =
+                measurement(&axes, position_m, 0.1 * libm::sin(TAU * 2.3 * t), camera, k);
+            (truth, Some(measured))
         })
         .unzip()
 }
 
 /// Returns the moments of 600 projected points of an ellipsoid with a bent tail.
-fn look(axes: &body::Axes, place: [f64; 3], bend: f64, camera: &Camera, frame: usize) -> Seen {
+fn measurement(
+    axes: &BodyAxes,
+    position_m: [f64; 3],
+    bend: f64,
+    camera: &Camera,
+    frame: usize,
+) -> Measurement {
     let points: Vec<[f64; 2]> = (0..600)
         .map(|m| {
             let [a, b, c] = [0, 1, 2].map(|word| random::normal(11, &[m, word]));
@@ -56,7 +64,7 @@ fn look(axes: &body::Axes, place: [f64; 3], bend: f64, camera: &Camera, frame: u
             let side = c * 0.018 / 4.0 + bend * (along - 0.05).powi(2) / 0.1;
             let down = b * ANIMAL.height_m / 4.0;
             let point: [f64; 3] = std::array::from_fn(|k| {
-                place[k] + axes.forward[k] * along + axes.down[k] * down + axes.side[k] * side
+                position_m[k] + axes.forward[k] * along + axes.down[k] * down + axes.side[k] * side
             });
             camera.image_from_camera(point)
         })
@@ -73,14 +81,14 @@ fn look(axes: &body::Axes, place: [f64; 3], bend: f64, camera: &Camera, frame: u
     let noise = |word: u64| random::normal(5, &[frame as u64, word]);
     let pitch = libm::asin(axes.forward[1]);
     let tall = libm::hypot(0.05 * libm::cos(pitch), 0.1 * libm::sin(pitch));
-    let apparent = camera.apparent_from_true_depth_m(place[2]);
-    Seen {
+    let apparent = camera.apparent_from_true_depth_m(position_m[2]);
+    Measurement {
         centroid_px: [mean[0] + 0.2 * noise(0), mean[1] + 0.2 * noise(1)],
         covariance_px2: [second(0, 0), second(0, 1), second(1, 1)],
-        upright_px: tall * camera.focal_px() / apparent * (1.0 + 0.02 * noise(2)),
+        vertical_px: tall * camera.focal_px() / apparent * (1.0 + 0.02 * noise(2)),
         cut: false,
-        toward: None,
-        ends: None,
+        given_head_px: None,
+        head_evidence: None,
     }
 }
 
@@ -96,14 +104,14 @@ fn angles_deg(truth: &[Truth], found: &[Option<Direction>]) -> Vec<f64> {
 }
 
 #[test]
-fn the_direction_of_a_wandering_swimmer_is_found_all_round() {
+fn directions_of_a_swimmer_are_found_all_round() {
     for medium_index in [1.0, 4.0 / 3.0] {
         let camera = Camera {
             medium_index,
             ..CAMERA
         };
-        let (truth, seen) = wandering(600, &camera);
-        let found = estimate(&seen, &camera, &ANIMAL, 30.0);
+        let (truth, measured) = swimmer(600, &camera);
+        let found = estimate(&measured, &camera, &ANIMAL, 30.0);
         let angles = angles_deg(&truth, &found);
         assert_eq!(angles.len(), 600);
         assert!(
@@ -126,14 +134,14 @@ fn the_direction_of_a_wandering_swimmer_is_found_all_round() {
 }
 
 #[test]
-fn a_swimmer_that_is_cut_or_lost_for_a_while_is_bridged_and_no_longer_gap_is() {
-    let (truth, mut seen) = wandering(400, &CAMERA);
-    for one in seen[100..140].iter_mut().flatten() {
+fn cut_frames_and_short_gaps_are_bridged_and_long_gaps_are_not() {
+    let (truth, mut measured) = swimmer(400, &CAMERA);
+    for one in measured[100..140].iter_mut().flatten() {
         one.cut = true;
     }
-    seen[200..210].fill(None);
-    seen[300..330].fill(None);
-    let found = estimate(&seen, &CAMERA, &ANIMAL, 30.0);
+    measured[200..210].fill(None);
+    measured[300..330].fill(None);
+    let found = estimate(&measured, &CAMERA, &ANIMAL, 30.0);
     assert!(found[205].is_some() && found[120].is_some());
     assert!(found[315].is_none());
     let angles = angles_deg(&truth, &found);
@@ -145,22 +153,22 @@ fn a_swimmer_that_is_cut_or_lost_for_a_while_is_bridged_and_no_longer_gap_is() {
 }
 
 #[test]
-fn a_pinned_head_holds_against_the_motion() {
-    let (truth, mut seen) = wandering(300, &CAMERA);
+fn a_given_head_outweighs_the_motion() {
+    let (truth, mut measured) = swimmer(300, &CAMERA);
     let backward = truth[150].forward.map(|c| -c);
-    for one in seen[149..152].iter_mut().flatten() {
-        one.toward = Some([backward[0], backward[1]]);
+    for one in measured[149..152].iter_mut().flatten() {
+        one.given_head_px = Some([backward[0], backward[1]]);
     }
-    let found = estimate(&seen, &CAMERA, &ANIMAL, 30.0);
+    let found = estimate(&measured, &CAMERA, &ANIMAL, 30.0);
     let forward = found[150].expect("found").forward;
     assert!(forward[0] * backward[0] + forward[1] * backward[1] > -1e-3);
 }
 
 #[test]
-fn too_little_is_no_direction() {
-    let (_, seen) = wandering(20, &CAMERA);
+fn too_few_measurements_give_no_direction() {
+    let (_, measured) = swimmer(20, &CAMERA);
     assert!(
-        estimate(&seen, &CAMERA, &ANIMAL, 30.0)
+        estimate(&measured, &CAMERA, &ANIMAL, 30.0)
             .iter()
             .all(Option::is_none)
     );
@@ -171,45 +179,40 @@ fn too_little_is_no_direction() {
     );
 }
 
-/// Adds whole turns so that the yaw is continuous.
-fn unwrapped(states: &mut [State]) {
-    for k in 1..states.len() {
-        let last = states[k - 1].yaw();
-        states[k].0[1] = last + crate::geometry::wrap_rad(states[k].yaw() - last);
-    }
-}
-
 #[test]
-fn a_turn_taken_for_its_mirror_image_is_set_right() {
-    let (truth, seen) = wandering(800, &CAMERA);
-    let views = Views::of(&seen, &CAMERA, 30.0).expect("seen");
-    let shape = Shape::first(&views, &ANIMAL).expect("seen");
-    let energy = Energy::new(&views, &shape);
-    let mut right = sphere::decode(&views, &shape).states(&views, &shape);
+fn a_mirrored_turn_is_corrected() {
+    let (truth, measured) = swimmer(800, &CAMERA);
+    let observations = Observations::new(&measured, &CAMERA, 30.0).expect("measured");
+    let shape = Shape::initial(&observations, &ANIMAL).expect("measured");
+    let energy = Energy {
+        observations: &observations,
+        shape: &shape,
+    };
+    let mut right = sphere::decode(&observations, &shape).initial_states(&observations, &shape);
     for (state, truth) in right.iter_mut().zip(&truth) {
-        state.0[1] = libm::atan2(truth.forward[2], truth.forward[0]);
-        state.0[2] = libm::asin(truth.forward[1]);
+        state.yaw = libm::atan2(truth.forward[2], truth.forward[0]);
+        state.pitch = libm::asin(truth.forward[1]);
     }
-    unwrapped(&mut right);
-    solve::whole(&energy, &mut right);
-    let away = |state: &State| libm::sin(state.yaw()) > 0.0;
+    mirror::unwrap_yaw(&mut right);
+    solve::minimize(&energy, &mut right);
+    let away = |state: &State| libm::sin(state.yaw) > 0.0;
     let ends: Vec<usize> = (1..800)
         .filter(|&k| away(&right[k]) != away(&right[k - 1]))
         .collect();
     let turns = ends.windows(2).map(|pair| pair[0]..pair[1]);
-    let stretch = turns
+    let range = turns
         .min_by_key(|turn| turn.len().abs_diff(60))
         .expect("it turns");
     let mut wrong = right.clone();
-    for state in &mut wrong[stretch.clone()] {
-        state.0[1] = -state.yaw();
+    for state in &mut wrong[range.clone()] {
+        state.yaw = -state.yaw;
     }
-    unwrapped(&mut wrong);
-    solve::whole(&energy, &mut wrong);
-    let middle = stretch.start.midpoint(stretch.end);
+    mirror::unwrap_yaw(&mut wrong);
+    solve::minimize(&energy, &mut wrong);
+    let middle = range.start.midpoint(range.end);
     assert_ne!(away(&wrong[middle]), away(&right[middle]), "still mirrored");
     mirror::improve(&energy, &mut wrong);
     assert_eq!(away(&wrong[middle]), away(&right[middle]));
-    solve::whole(&energy, &mut wrong);
+    solve::minimize(&energy, &mut wrong);
     assert!(energy.cost(0, &wrong) < 1.01 * energy.cost(0, &right));
 }

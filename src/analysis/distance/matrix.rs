@@ -13,7 +13,7 @@ pub struct DistanceMatrix {
 
 impl DistanceMatrix {
     /// Computes every distance. Memory grows with the square of the number of clips: 8192 clips take 268 MB.
-    pub fn of(distances: &Distances<'_>, progress: &dyn Progress) -> Result<Self, Cancelled> {
+    pub fn compute(distances: &Distances<'_>, progress: &dyn Progress) -> Result<Self, Cancelled> {
         let n_clips = distances.n_clips();
         let mut triangle = Vec::with_capacity(n_clips * (n_clips + 1) / 2);
         distances.for_each_row(progress, |_, row| triangle.extend_from_slice(row))?;
@@ -22,7 +22,7 @@ impl DistanceMatrix {
 
     /// Creates a matrix from its upper triangle, by rows.
     #[cfg(test)]
-    pub(crate) fn of_triangle(n_clips: usize, triangle: Vec<u64>) -> Self {
+    pub(crate) fn from_triangle(n_clips: usize, triangle: Vec<u64>) -> Self {
         DistanceMatrix { n_clips, triangle }
     }
 

@@ -151,7 +151,7 @@ impl<'a> Panel<'a> {
     /// Returns the marked pairs of these clips with an exact distance below the limit.
     fn exact_pairs(&mut self, first: usize, candidates: &[Marks]) -> Vec<Vec<ClipPair>> {
         let tiles = Tiles::new(self.distances, first, candidates, &mut self.buffers);
-        let one = |(from, candidates): (usize, &Marks)| {
+        let pairs_of_clip = |(from, candidates): (usize, &Marks)| {
             let pair = |offset: usize| {
                 let weighted = (from..).zip(&self.weights);
                 let d = weighted.map(|(row, w)| w * tiles.sad(row, row + offset));
@@ -167,7 +167,7 @@ impl<'a> Panel<'a> {
         let clips = (first..first + candidates.len())
             .into_par_iter()
             .zip(candidates);
-        clips.map(one).collect()
+        clips.map(pairs_of_clip).collect()
     }
 }
 

@@ -77,7 +77,7 @@ pub(crate) fn matrix_of_gray_levels(levels: &[u8], n_pixels: u32) -> DistanceMat
         side: Side::Plain,
         cpu: Level::detect(),
     };
-    DistanceMatrix::of(&distances, &Silent).expect("nobody cancels")
+    DistanceMatrix::compute(&distances, &Silent).expect("nobody cancels")
 }
 
 /// Returns the upper triangle as the engine computes it.
@@ -254,9 +254,10 @@ proptest! {
                 *pixel = [light as u8, 255 - light as u8, (frame_idx % 9 * 3) as u8, light as u8];
             }
         });
-        let poses = match from_above {
-            true => poses(View::Top, (0..n_frames).map(|k| Some(k as f64 * 0.7))),
-            false => side_poses(&sprites),
+        let poses = if from_above {
+            poses(View::Top, (0..n_frames).map(|k| Some(k as f64 * 0.7)))
+        } else {
+            side_poses(&sprites)
         };
         let pixels = compared(&sprites, &poses, Planes::Rgba);
         for side in [Side::Plain, Side::Mirrored] {

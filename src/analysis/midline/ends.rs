@@ -1,10 +1,11 @@
 //! Finds the two ends of an outline, head and tail, at its points of highest curvature
 //! (docs/explanation/algorithms.md, "Midline and tail beat").
 
+use super::distance;
 use super::outline::N_POINTS;
 
 /// Distance from a point to each of the two neighbors that its curvature is computed from, outline points.
-const REACH: usize = 4;
+const NEIGHBOR_DISTANCE: usize = 4;
 
 /// Returns the indices of the two ends of an outline: the sharper one first, then the opposite one.
 ///
@@ -12,29 +13,32 @@ const REACH: usize = 4;
 /// high curvature around the point farthest from it by index. The center is used instead of the highest peak,
 /// because a head may have two eyes or two ears at its corners.
 pub(super) fn ends(outline: &[[f64; 2]]) -> [usize; 2] {
-    let sharpest = peaks(&above_mean(outline))
+    let sharpest = peaks(&excess_curvature(outline))
         .into_iter()
-        .reduce(|best, peak| match best.integral >= peak.integral {
-            true => best,
-            false => peak,
+        .reduce(|best, peak| {
+            if best.integral >= peak.integral {
+                best
+            } else {
+                peak
+            }
         });
     let sharp = sharpest.map_or(0, |peak| peak.at);
-    [sharp, across(outline, sharp)]
+    [sharp, opposite_end(outline, sharp)]
 }
 
 /// Returns the index of the end opposite a given end.
-pub(super) fn across(outline: &[[f64; 2]], end: usize) -> usize {
-    bent_around(&above_mean(outline), (end + N_POINTS / 2) % N_POINTS)
+pub(super) fn opposite_end(outline: &[[f64; 2]], end: usize) -> usize {
+    curvature_center(&excess_curvature(outline), (end + N_POINTS / 2) % N_POINTS)
 }
 
-fn above_mean(outline: &[[f64; 2]]) -> Vec<f64> {
+fn excess_curvature(outline: &[[f64; 2]]) -> Vec<f64> {
     let curvature = curvature(outline);
     let mean = curvature.iter().sum::<f64>() / N_POINTS as f64;
     curvature.iter().map(|c| c - mean).collect()
 }
 
 /// Returns the center of the above-mean curvature near an index, by four iterations of the weighted mean.
-fn bent_around(above: &[f64], start: usize) -> usize {
+fn curvature_center(above: &[f64], start: usize) -> usize {
     const NEAR: i64 = N_POINTS as i64 / 6;
     let at = |offset: i64| (start as i64 + offset).rem_euclid(N_POINTS as i64) as usize;
     let mut shift = 0;
@@ -54,13 +58,13 @@ fn bent_around(above: &[f64], start: usize) -> usize {
 
 /// Returns the curvature at each point of a clockwise outline, 1/pixels, positive where it is convex.
 ///
-/// The curvature is four times the area of the triangle with the two points at distance `REACH`, divided by
+/// The curvature is four times the area of the triangle with the two points at distance `NEIGHBOR_DISTANCE`, divided by
 /// the product of its sides.
 fn curvature(outline: &[[f64; 2]]) -> Vec<f64> {
-    let distance = |p: [f64; 2], q: [f64; 2]| libm::hypot(q[0] - p[0], q[1] - p[1]);
     (0..N_POINTS)
         .map(|k| {
-            let [a, b, c] = [k + N_POINTS - REACH, k, k + REACH].map(|at| outline[at % N_POINTS]);
+            let [a, b, c] = [k + N_POINTS - NEIGHBOR_DISTANCE, k, k + NEIGHBOR_DISTANCE]
+                .map(|at| outline[at % N_POINTS]);
             let cross = (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0]);
             2.0 * cross / (distance(a, b) * distance(b, c) * distance(a, c)).max(1e-9)
         })
@@ -106,7 +110,7 @@ mod tests {
     use super::*;
 
     /// Returns the outline of a drop: round at index 64, pointed at index 0.
-    fn drop() -> Vec<[f64; 2]> {
+    fn drop_outline() -> Vec<[f64; 2]> {
         (0..N_POINTS)
             .map(|k| {
                 let t = TAU * k as f64 / N_POINTS as f64;
@@ -116,24 +120,24 @@ mod tests {
     }
 
     #[test]
-    fn a_drop_ends_in_its_point_and_across_from_it() {
-        let [point, round] = ends(&drop());
+    fn ends_of_a_drop_are_its_point_and_the_opposite_side() {
+        let [point, round] = ends(&drop_outline());
         assert!(point <= 1 || point >= N_POINTS - 1, "{point}");
         assert!(round.abs_diff(64) <= 12, "{round}");
     }
 
     #[test]
-    fn a_head_with_two_eyes_ends_between_them() {
+    fn the_end_of_a_head_with_two_eyes_is_between_them() {
         let mut above = vec![-1.0; N_POINTS];
         for eye in [58, 72] {
             above[eye - 2..=eye + 2].fill(5.0);
         }
-        assert_eq!(bent_around(&above, 64), 65);
-        assert_eq!(bent_around(&above, 70), 65);
+        assert_eq!(curvature_center(&above, 64), 65);
+        assert_eq!(curvature_center(&above, 70), 65);
     }
 
     #[test]
-    fn a_circle_is_bent_by_one_over_its_radius_everywhere() {
+    fn curvature_of_a_circle_is_one_over_its_radius() {
         let circle: Vec<[f64; 2]> = (0..N_POINTS)
             .map(|k| TAU * k as f64 / N_POINTS as f64)
             .map(|t| [10.0 * t.cos(), 10.0 * t.sin()])

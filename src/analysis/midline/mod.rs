@@ -18,47 +18,48 @@ use super::track::Track;
 use super::track::sighting::Sighting;
 use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
+use crate::order::median;
 use crate::raster::RgbaImage;
 
 /// Number of points in a midline, including head and tail tip. Free choice.
 pub const N_POINTS: usize = 11;
 /// Median ratio of length to height above which an animal in side view gets a midline. Free choice.
-const LONG: f64 = 3.0;
+const MIN_ELONGATION: f64 = 3.0;
 /// Smallest length of a midline, as a share of the length of the silhouette. Free choice.
-const LEAST_REACH: f64 = 0.8;
+const MIN_LENGTH_SHARE: f64 = 0.8;
 /// Below this cosine between the heading and the line from end to end, the previous frame decides which end
 /// is the head. Free choice.
-const ACROSS: f64 = 0.25;
+const MIN_LEAD_COSINE: f64 = 0.25;
 
 /// Sets the midline, from head to tail, and the bend of every pose with a known heading.
 pub fn trace(poses: &mut Poses, track: &Track) {
     if poses.view == View::Side && !is_long(&poses.frames) {
         return;
     }
-    let traced: Vec<Option<Traced>> = poses
+    let midlines: Vec<Option<Midline>> = poses
         .frames
         .par_iter()
         .zip(&track.frames)
         .map(|(pose, tracked)| {
             let sighting = tracked.sighting.as_ref()?;
-            midline(sighting, &track.image(sighting), pose)
+            extract(sighting, &track.image(sighting), pose)
         })
         .collect();
     let mut last: Option<[f64; 2]> = None;
-    for (pose, traced) in poses.frames.iter_mut().zip(traced) {
-        let Some(mut traced) = traced else {
+    for (pose, midline) in poses.frames.iter_mut().zip(midlines) {
+        let Some(mut midline) = midline else {
             last = None;
             continue;
         };
         if let Some(head) = last
-            && traced.unsure
-            && distance(traced.points[N_POINTS - 1], head) < distance(traced.points[0], head)
+            && midline.is_head_uncertain
+            && distance(midline.points[N_POINTS - 1], head) < distance(midline.points[0], head)
         {
-            traced.points.reverse();
+            midline.points.reverse();
         }
-        last = Some(traced.points[0]);
-        pose.bend_rad = Some(bend_rad(&traced.points));
-        pose.midline_px = Some(traced.points);
+        last = Some(midline.points[0]);
+        pose.bend_rad = Some(bend_rad(&midline.points));
+        pose.midline_px = Some(midline.points);
     }
 }
 
@@ -68,33 +69,26 @@ pub fn bend_rad(midline: &[[f64; 2]]) -> f64 {
     if thirds.len() < 4 {
         return 0.0;
     }
-    let along = |k: usize| {
-        libm::atan2(
-            thirds[k + 1][1] - thirds[k][1],
-            thirds[k + 1][0] - thirds[k][0],
-        )
-    };
-    wrap_rad(along(2) - along(0))
+    let angle = |from: [f64; 2], to: [f64; 2]| libm::atan2(to[1] - from[1], to[0] - from[0]);
+    wrap_rad(angle(thirds[2], thirds[3]) - angle(thirds[0], thirds[1]))
 }
 
 fn is_long(frames: &[Pose]) -> bool {
-    let mut ratios: Vec<f64> = frames
+    let ratios = frames
         .iter()
-        .filter_map(|pose| Some(pose.length_px? / pose.height_px?.max(1.0)))
-        .collect();
-    let middle = ratios.len() / 2;
-    !ratios.is_empty() && *ratios.select_nth_unstable_by(middle, f64::total_cmp).1 > LONG
+        .filter_map(|pose| Some(pose.length_px? / pose.height_px?.max(1.0)));
+    median(ratios).is_some_and(|ratio| ratio > MIN_ELONGATION)
 }
 
-struct Traced {
+struct Midline {
     /// Points from head to tail, pixels.
     points: Vec<[f64; 2]>,
     /// True where the heading is nearly perpendicular to the line from end to end, so that it may name the
     /// wrong head.
-    unsure: bool,
+    is_head_uncertain: bool,
 }
 
-fn midline(sighting: &Sighting, image: &RgbaImage, pose: &Pose) -> Option<Traced> {
+fn extract(sighting: &Sighting, image: &RgbaImage, pose: &Pose) -> Option<Midline> {
     let heading = pose.heading_rad?;
     let toward = [libm::cos(heading), libm::sin(heading)];
     let alpha: Vec<u8> = image.pixels.chunks_exact(4).map(|rgba| rgba[3]).collect();
@@ -103,44 +97,37 @@ fn midline(sighting: &Sighting, image: &RgbaImage, pose: &Pose) -> Option<Traced
     let [one, other] = ends::ends(&outline);
     let span = [0, 1].map(|c| outline[one][c] - outline[other][c]);
     let lead = span[0] * toward[0] + span[1] * toward[1];
-    let unsure = lead.abs() < ACROSS * libm::hypot(span[0], span[1]);
-    let (head, tail) = match lead >= 0.0 {
-        true => (one, other),
-        false => (other, one),
-    };
-    // An eye may be sharper than the tail. The head is then the end opposite the tail.
-    let head = if head == one {
-        ends::across(&outline, tail)
+    let is_head_uncertain = lead.abs() < MIN_LEAD_COSINE * libm::hypot(span[0], span[1]);
+    let (head, tail) = if lead >= 0.0 {
+        // An eye may be sharper than the tail. The head is then the end opposite the tail.
+        (ends::opposite_end(&outline, other), other)
     } else {
-        head
+        (other, one)
     };
-    let walked = resampled(&walk::walk(&outline, head, tail), N_POINTS);
-    if is_sound(&walked, pose) {
-        return Some(Traced {
-            points: walked,
-            unsure,
+    let points = resampled(&walk::midpoints(&outline, head, tail), N_POINTS);
+    if is_plausible(&points, pose) {
+        return Some(Midline {
+            points,
+            is_head_uncertain,
         });
     }
-    let points = resampled(&sections::means(rect, &alpha, toward), N_POINTS);
-    (points.len() == N_POINTS).then_some(Traced {
+    let points = resampled(&sections::section_means(rect, &alpha, toward), N_POINTS);
+    (points.len() == N_POINTS).then_some(Midline {
         points,
-        unsure: false,
+        is_head_uncertain: false,
     })
 }
 
 /// Returns whether a midline is as long as the animal and does not double back.
-fn is_sound(points: &[[f64; 2]], pose: &Pose) -> bool {
+fn is_plausible(points: &[[f64; 2]], pose: &Pose) -> bool {
     let length_px: f64 = points.windows(2).map(|p| distance(p[0], p[1])).sum();
     let doubles_back = points.windows(3).any(|p| {
-        let (a, b) = (
-            [p[1][0] - p[0][0], p[1][1] - p[0][1]],
-            [p[2][0] - p[1][0], p[2][1] - p[1][1]],
-        );
-        a[0] * b[0] + a[1] * b[1] <= 0.0
+        let along = |c: usize| (p[1][c] - p[0][c]) * (p[2][c] - p[1][c]);
+        along(0) + along(1) <= 0.0
     });
     points.len() == N_POINTS
         && !doubles_back
-        && length_px >= LEAST_REACH * pose.length_px.unwrap_or(0.0)
+        && length_px >= MIN_LENGTH_SHARE * pose.length_px.unwrap_or(0.0)
 }
 
 /// Returns `n` points at equal distances along a line, including its ends; empty for a line without length.

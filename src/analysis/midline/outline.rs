@@ -3,6 +3,7 @@
 
 use std::f64::consts::TAU;
 
+use super::distance;
 use crate::geometry::Rect;
 
 /// Number of points in a smoothed outline.
@@ -18,18 +19,10 @@ const LEVEL: f64 = 127.5;
 /// They are evenly spaced before smoothing. Returns `None` if no area above one pixel is at least half
 /// opaque.
 pub(super) fn outline(rect: Rect, alpha: &[u8]) -> Option<Vec<[f64; 2]>> {
-    let grid = Grid::new(rect, alpha);
-    let loops = grid.loops();
+    let loops = Grid::new(rect, alpha).loops().into_iter();
     let largest = loops
-        .into_iter()
-        .map(|points| (enclosed_px(&points), points))
-        .fold(
-            None,
-            |best: Option<(f64, Vec<[f64; 2]>)>, next| match best {
-                Some(best) if best.0 >= next.0 => Some(best),
-                _ => Some(next),
-            },
-        );
+        .map(|points| (enclosed_px2(&points), points))
+        .reduce(|best, next| if best.0 >= next.0 { best } else { next });
     // The inside is on the right of the outline. Holes run the other way and have a negative area.
     let (area, points) = largest?;
     (area > 1.0).then(|| smoothed(&evenly_spaced(&points)))
@@ -37,7 +30,7 @@ pub(super) fn outline(rect: Rect, alpha: &[u8]) -> Option<Vec<[f64; 2]>> {
 
 /// Returns the area enclosed by a closed polygon, square pixels, positive when it runs clockwise on the
 /// screen.
-pub(super) fn enclosed_px(points: &[[f64; 2]]) -> f64 {
+fn enclosed_px2(points: &[[f64; 2]]) -> f64 {
     let after = points.iter().cycle().skip(1);
     let twice: f64 = (points.iter().zip(after))
         .map(|(p, q)| p[0] * q[1] - q[0] * p[1])
@@ -79,7 +72,7 @@ impl Grid {
         let mut next = vec![None; 2 * self.values.len()];
         for y in 0..self.height - 1 {
             for x in 0..self.width - 1 {
-                self.cross_cell(y * self.width + x, &mut next);
+                self.link_edges(y * self.width + x, &mut next);
             }
         }
         let mut loops = Vec::new();
@@ -102,7 +95,7 @@ impl Grid {
     ///
     /// In clockwise order of the corners, the outline enters the cell where they change from inside to
     /// outside.
-    fn cross_cell(&self, k: usize, next: &mut [Option<usize>]) {
+    fn link_edges(&self, k: usize, next: &mut [Option<usize>]) {
         let corners = [k, k + 1, k + self.width + 1, k + self.width];
         let edges = [2 * k, 2 * (k + 1) + 1, 2 * (k + self.width), 2 * k + 1];
         let inside = corners.map(|at| self.values[at] > LEVEL);
@@ -116,9 +109,10 @@ impl Grid {
                 !inside[other] && inside[(other + 1) % 4]
             };
             // If only two opposite corners are inside, the mean decides whether they are connected.
-            let step = match middle > LEVEL {
-                true => (1..4).find(leaves),
-                false => (1..4).rev().find(leaves),
+            let step = if middle > LEVEL {
+                (1..4).find(leaves)
+            } else {
+                (1..4).rev().find(leaves)
             };
             next[edges[side]] = step.map(|step| edges[(side + step) % 4]);
         }
@@ -144,7 +138,7 @@ impl Grid {
 fn evenly_spaced(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let at = |k: usize| points[k % points.len()];
     let lengths: Vec<f64> = (0..points.len())
-        .map(|k| libm::hypot(at(k + 1)[0] - at(k)[0], at(k + 1)[1] - at(k)[1]))
+        .map(|k| distance(at(k), at(k + 1)))
         .collect();
     let step = lengths.iter().sum::<f64>() / N_POINTS as f64;
     let (mut k, mut passed) = (0, 0.0);
@@ -218,11 +212,11 @@ mod tests {
             let radius = libm::hypot(x - 130.3, y - 73.8);
             assert!((radius - 20.0).abs() < 0.15, "{radius}");
         }
-        assert!(enclosed_px(&points) > 0.0, "clockwise on the screen");
+        assert!(enclosed_px2(&points) > 0.0, "clockwise on the screen");
     }
 
     #[test]
-    fn the_largest_part_is_outlined_and_holes_are_not() {
+    fn only_the_largest_part_is_outlined() {
         let (large, hole, small) = (
             disc([24.0, 24.0], 18.0),
             disc([24.0, 24.0], 8.0),
@@ -232,11 +226,11 @@ mod tests {
             .map(|k| (large[k] - hole[k]).max(small[k]))
             .collect();
         let points = outline(Rect::of_size(64, 64), &alpha).expect("it is opaque");
-        assert!((enclosed_px(&points) - 324.0 * TAU / 2.0).abs() < 12.0);
+        assert!((enclosed_px2(&points) - 324.0 * TAU / 2.0).abs() < 12.0);
     }
 
     #[test]
-    fn what_is_nowhere_half_opaque_has_no_outline() {
+    fn transparent_mattes_have_no_outline() {
         assert_eq!(outline(Rect::of_size(4, 4), &[100; 16]), None);
     }
 }

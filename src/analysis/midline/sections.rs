@@ -9,7 +9,7 @@ const N_SECTIONS: usize = 12;
 /// Returns the means of the cross-sections perpendicular to `toward`, front first, in image pixels.
 ///
 /// `toward` is a unit vector toward the head. Empty sections are omitted.
-pub(super) fn means(rect: Rect, alpha: &[u8], toward: [f64; 2]) -> Vec<[f64; 2]> {
+pub(super) fn section_means(rect: Rect, alpha: &[u8], toward: [f64; 2]) -> Vec<[f64; 2]> {
     let solid = || {
         let width = rect.w.max(1) as usize;
         alpha

@@ -11,37 +11,40 @@
 
 use std::f64::consts::{LN_2, TAU};
 
-use crate::library::{BeatSpan, Poses, TailBeat, TailBeatMethod, View};
+use crate::library::{BeatSpan, Pose, Poses, TailBeat, TailBeatMethod, View};
+use crate::order::median;
 
 /// Half the length of a window, seconds. Free choice.
-const HALF_S: f64 = 1.0;
+const HALF_WINDOW_S: f64 = 1.0;
 /// Distance between windows, seconds. Free choice.
 const HOP_S: f64 = 0.25;
 /// Range of frequencies, Hz. The upper end is also limited to 0.45 of the frame rate. Free choice.
 const BAND_HZ: [f64; 2] = [0.5, 12.0];
 /// Logarithm of the ratio of neighboring frequencies. Free choice.
-const STEP: f64 = 0.04;
+const LOG_STEP: f64 = 0.04;
 /// Cost of a change in frequency between windows, per factor of e. Free choice.
-const CHANGE: f64 = 32.0;
+const CHANGE_COST: f64 = 32.0;
 /// Smallest ratio of power to noise floor for which a beat is reported. Free choice.
-const LEVEL: f64 = 4.0;
+const MIN_POWER_RATIO: f64 = 4.0;
 /// Smallest number of successive windows for which a beat is reported. Free choice.
-const LEAST_WINDOWS: usize = 4;
+const MIN_WINDOWS: usize = 4;
 /// Smallest share of measured frames in a window. Free choice.
-const LEAST_SHARE: f64 = 0.6;
+const MIN_MEASURED_SHARE: f64 = 0.6;
 /// Smallest number of frames in a window: four for the cubic trend, two for the wave, three to test the fit.
 /// Below 4 frames per second a window has fewer, and no beat is measured.
-const LEAST_WINDOW_FRAMES: usize = 9;
+const MIN_WINDOW_FRAMES: usize = 9;
 
 /// Returns the tail beat, or `None` if no part of the footage shows one.
 pub fn measure(poses: &Poses) -> Option<TailBeat> {
-    let bends = poses.frames.iter().any(|pose| pose.bend_rad.is_some());
-    let (method, signals) = match (poses.view, bends) {
-        (View::Top, true) => (TailBeatMethod::Bend, vec![bend(poses)]),
-        (View::Top, false) => return None,
-        (View::Side, _) => (
+    let signal =
+        |value: fn(&Pose) -> Option<f64>| -> Signal { poses.frames.iter().map(value).collect() };
+    let bend = signal(|pose| pose.bend_rad);
+    let (method, signals) = match poses.view {
+        View::Top if bend.iter().all(Option::is_none) => return None,
+        View::Top => (TailBeatMethod::Bend, vec![bend]),
+        View::Side => (
             TailBeatMethod::LengthAndSkew,
-            vec![length(poses), skew(poses)],
+            vec![signal(log_length), signal(skew)],
         ),
     };
     let spans = spans(&signals, poses.fps);
@@ -50,25 +53,19 @@ pub fn measure(poses: &Poses) -> Option<TailBeat> {
 
 type Signal = Vec<Option<f64>>;
 
-fn bend(poses: &Poses) -> Signal {
-    poses.frames.iter().map(|pose| pose.bend_rad).collect()
-}
-
 /// Returns the logarithm of the length. An oscillation is then relative to the length at any distance.
-fn length(poses: &Poses) -> Signal {
-    let one = |pose: &crate::library::Pose| pose.length_px.filter(|&l| l > 0.0 && !pose.cut);
-    (poses.frames.iter())
-        .map(|pose| one(pose).map(libm::log))
-        .collect()
+fn log_length(pose: &Pose) -> Option<f64> {
+    let length_px = pose
+        .length_px
+        .filter(|&length_px| length_px > 0.0 && !pose.cut);
+    length_px.map(libm::log)
 }
 
 /// Returns the skew, positive toward the head.
-fn skew(poses: &Poses) -> Signal {
-    let one = |pose: &crate::library::Pose| {
-        let toward = libm::cos(pose.heading_rad? - pose.axis_rad?).signum();
-        pose.skew.filter(|_| !pose.cut).map(|skew| toward * skew)
-    };
-    poses.frames.iter().map(one).collect()
+fn skew(pose: &Pose) -> Option<f64> {
+    let toward_head = libm::cos(pose.heading_rad? - pose.axis_rad?).signum();
+    let skew = pose.skew.filter(|_| !pose.cut)?;
+    Some(toward_head * skew)
 }
 
 /// The spectrum of one window.
@@ -86,9 +83,10 @@ impl Window {
     fn strongest_near(&self, k: usize) -> usize {
         let last = self.amplitude.len() - 1;
         (k.saturating_sub(5)..=(k + 5).min(last)).fold(k, |best, other| {
-            match self.amplitude[other] > self.amplitude[best] {
-                true => other,
-                false => best,
+            if self.amplitude[other] > self.amplitude[best] {
+                other
+            } else {
+                best
             }
         })
     }
@@ -96,7 +94,7 @@ impl Window {
 
 fn spans(signals: &[Signal], fps: f64) -> Vec<BeatSpan> {
     let band = Band::new(fps);
-    if band.weights.len() < LEAST_WINDOW_FRAMES {
+    if band.weights.len() < MIN_WINDOW_FRAMES {
         return Vec::new();
     }
     let hop = ((HOP_S * fps).round() as usize).max(1);
@@ -104,13 +102,13 @@ fn spans(signals: &[Signal], fps: f64) -> Vec<BeatSpan> {
     let middles = (band.half..n_frames.saturating_sub(band.half)).step_by(hop);
     let mut spans = Vec::new();
     let mut run: Vec<Window> = Vec::new();
-    for window in middles.map(|middle| band.look(signals, middle)) {
+    for window in middles.map(|middle| band.spectrum(signals, middle)) {
         match window {
             Some(window) => run.push(window),
-            None => follow(&std::mem::take(&mut run), &band, hop, &mut spans),
+            None => add_spans(&std::mem::take(&mut run), &band, hop, &mut spans),
         }
     }
-    follow(&run, &band, hop, &mut spans);
+    add_spans(&run, &band, hop, &mut spans);
     spans
 }
 
@@ -127,11 +125,11 @@ struct Band {
 
 impl Band {
     fn new(fps: f64) -> Band {
-        let half = ((HALF_S * fps).round() as usize).max(1);
+        let half = ((HALF_WINDOW_S * fps).round() as usize).max(1);
         let most = BAND_HZ[1].min(0.45 * fps);
-        let n = (libm::log(most / BAND_HZ[0]) / STEP).floor().max(-1.0) as i32 + 1;
+        let n = (libm::log(most / BAND_HZ[0]) / LOG_STEP).floor().max(-1.0) as i32 + 1;
         let frequencies_hz: Vec<f64> = (0..n)
-            .map(|k| BAND_HZ[0] * libm::exp(STEP * f64::from(k)))
+            .map(|k| BAND_HZ[0] * libm::exp(LOG_STEP * f64::from(k)))
             .collect();
         let offsets: Vec<f64> = (0..=2 * half).map(|k| k as f64 - half as f64).collect();
         let wave = |f: &f64| -> Vec<[f64; 2]> {
@@ -149,13 +147,13 @@ impl Band {
     }
 
     /// Returns the spectrum around one frame over all signals, or `None` with too few measured frames.
-    fn look(&self, signals: &[Signal], middle: usize) -> Option<Window> {
+    fn spectrum(&self, signals: &[Signal], middle: usize) -> Option<Window> {
         let mut evidence = vec![0.0; self.frequencies_hz.len()];
         let mut first = None;
         for signal in signals {
             let samples = self.detrended(&signal[middle - self.half..=middle + self.half])?;
             let amplitude: Vec<f64> = (self.waves.iter())
-                .map(|wave| self.amplitude(&samples, wave))
+                .map(|wave| amplitude(&samples, wave))
                 .collect();
             let power: Vec<f64> = amplitude.iter().map(|a| a * a).collect();
             let floor = self.noise_floor(&power);
@@ -176,82 +174,86 @@ impl Band {
     fn noise_floor(&self, power: &[f64]) -> Vec<f64> {
         let (low, high) = self.frequencies_hz.split_at(power.len() / 2);
         let squared = low.iter().zip(power).map(|(f, p)| f * f * p);
-        let wandering = mean_of_noise(squared.collect());
-        let noise = mean_of_noise(power[power.len() - high.len()..].to_vec());
+        let wandering = mean_of_noise(squared);
+        let noise = mean_of_noise(power[power.len() - high.len()..].iter().copied());
         (self.frequencies_hz.iter())
             .map(|f| (wandering / (f * f)).max(noise).max(1e-15))
             .collect()
     }
 
-    /// Returns the samples of a window as (index, weight, value), without their weighted cubic trend.
-    fn detrended(&self, window: &[Option<f64>]) -> Option<Vec<(usize, f64, f64)>> {
-        let mut samples: Vec<(usize, f64, f64)> = (window.iter().enumerate())
-            .filter_map(|(k, value)| Some((k, self.weights[k], (*value)?)))
-            .collect();
-        if (samples.len() as f64) < LEAST_SHARE * window.len() as f64 {
+    /// Returns the weighted samples of a window without their weighted cubic trend.
+    fn detrended(&self, window: &[Option<f64>]) -> Option<Vec<Sample>> {
+        let n_measured = window.iter().flatten().count();
+        if (n_measured as f64) < MIN_MEASURED_SHARE * window.len() as f64 {
             return None;
         }
-        let mut powers: Vec<Vec<f64>> = Vec::new();
+        let sample = |(value, &weight): (&Option<f64>, &f64)| Sample {
+            value: value.unwrap_or(0.0),
+            weight: if value.is_some() { weight } else { 0.0 },
+        };
+        let mut samples: Vec<Sample> = window.iter().zip(&self.weights).map(sample).collect();
+        // Orthonormal polynomials (Gram-Schmidt).
+        let mut basis: Vec<Vec<f64>> = Vec::new();
         for degree in 0..4 {
             let at = |k: usize| (k as f64 / self.half as f64 - 1.0).powi(degree);
-            let mut power: Vec<f64> = samples.iter().map(|&(k, ..)| at(k)).collect();
+            let mut power: Vec<f64> = (0..window.len()).map(at).collect();
             let dot = |p: &[f64], q: &[f64]| -> f64 {
                 let terms = samples.iter().zip(p).zip(q);
-                terms.map(|(((_, w, _), p), q)| w * p * q).sum()
+                terms.map(|((sample, p), q)| sample.weight * p * q).sum()
             };
-            for earlier in &powers {
+            for earlier in &basis {
                 let share = dot(&power, earlier);
                 (power.iter_mut().zip(earlier)).for_each(|(p, e)| *p -= share * e);
             }
             let norm = dot(&power, &power).sqrt().max(1e-9);
             power.iter_mut().for_each(|p| *p /= norm);
-            powers.push(power);
+            basis.push(power);
         }
-        for power in &powers {
-            let share: f64 = samples
-                .iter()
-                .zip(power)
-                .map(|((_, w, y), p)| w * y * p)
-                .sum();
-            (samples.iter_mut().zip(power)).for_each(|(sample, p)| sample.2 -= share * p);
+        for power in &basis {
+            let terms = samples.iter().zip(power);
+            let share: f64 = terms.map(|(s, p)| s.weight * s.value * p).sum();
+            (samples.iter_mut().zip(power)).for_each(|(s, p)| s.value -= share * p);
         }
         Some(samples)
     }
+}
 
-    /// Returns the amplitude of the sinusoid that fits the weighted samples best.
-    fn amplitude(&self, samples: &[(usize, f64, f64)], wave: &[[f64; 2]]) -> f64 {
-        let [mut cc, mut cs, mut ss, mut yc, mut ys] = [0.0; 5];
-        for &(k, w, y) in samples {
-            let [c, s] = wave[k];
-            cc += w * c * c;
-            cs += w * c * s;
-            ss += w * s * s;
-            yc += w * y * c;
-            ys += w * y * s;
-        }
-        let determinant = (cc * ss - cs * cs).max(1e-12);
-        libm::hypot(yc * ss - ys * cs, ys * cc - yc * cs) / determinant
+/// One frame of a window; without a measurement, its weight is 0.
+struct Sample {
+    weight: f64,
+    value: f64,
+}
+
+/// Returns the amplitude of the sinusoid that fits the weighted samples best.
+fn amplitude(samples: &[Sample], wave: &[[f64; 2]]) -> f64 {
+    let [mut cc, mut cs, mut ss, mut yc, mut ys] = [0.0; 5];
+    for (sample, [c, s]) in samples.iter().zip(wave) {
+        let (w, y) = (sample.weight, sample.value);
+        cc += w * c * c;
+        cs += w * c * s;
+        ss += w * s * s;
+        yc += w * y * c;
+        ys += w * y * s;
     }
+    let determinant = (cc * ss - cs * cs).max(1e-12);
+    libm::hypot(yc * ss - ys * cs, ys * cc - yc * cs) / determinant
 }
 
 /// Returns the mean power of noise. Noise power is distributed exponentially: the mean is the median / ln 2.
-fn mean_of_noise(mut power: Vec<f64>) -> f64 {
-    power.sort_by(f64::total_cmp);
-    power
-        .get(power.len() / 2)
-        .map_or(0.0, |median| median / LN_2)
+fn mean_of_noise(power: impl Iterator<Item = f64>) -> f64 {
+    median(power).map_or(0.0, |median| median / LN_2)
 }
 
 /// Tracks one frequency through successive windows and adds the spans in which it stands out.
-fn follow(run: &[Window], band: &Band, hop: usize, spans: &mut Vec<BeatSpan>) {
-    let path = path(run);
-    let stands_out = |k: usize| libm::exp(run[k].evidence[path[k]]) > LEVEL;
+fn add_spans(run: &[Window], band: &Band, hop: usize, spans: &mut Vec<BeatSpan>) {
+    let path = best_path(run);
+    let stands_out = |k: usize| libm::exp(run[k].evidence[path[k]]) > MIN_POWER_RATIO;
     let mut from = 0;
     while from < run.len() {
         let to = (from..run.len())
             .find(|&k| !stands_out(k))
             .unwrap_or(run.len());
-        if to - from >= LEAST_WINDOWS {
+        if to - from >= MIN_WINDOWS {
             let mut at = from;
             while at < to {
                 // Within one span the frequency differs by at most one step.
@@ -268,13 +270,9 @@ fn follow(run: &[Window], band: &Band, hop: usize, spans: &mut Vec<BeatSpan>) {
 
 fn span(windows: &[Window], path: &[usize], band: &Band, hop: usize) -> BeatSpan {
     let n = windows.len() as f64;
-    let mean = |of: &dyn Fn(&Window, usize) -> f64| -> f64 {
-        windows
-            .iter()
-            .zip(path)
-            .map(|(w, &k)| of(w, k))
-            .sum::<f64>()
-            / n
+    let mean = |value: &dyn Fn(&Window, usize) -> f64| -> f64 {
+        let values = windows.iter().zip(path).map(|(w, &k)| value(w, k));
+        values.sum::<f64>() / n
     };
     let first = windows[0].middle - hop / 2;
     let end = windows[windows.len() - 1].middle + hop - hop / 2;
@@ -289,7 +287,7 @@ fn span(windows: &[Window], path: &[usize], band: &Band, hop: usize) -> BeatSpan
 }
 
 /// Returns the most probable sequence of frequencies, as indices into the band (Viterbi).
-fn path(run: &[Window]) -> Vec<usize> {
+fn best_path(run: &[Window]) -> Vec<usize> {
     let Some(n) = run.first().map(|window| window.evidence.len()) else {
         return Vec::new();
     };
@@ -299,13 +297,13 @@ fn path(run: &[Window]) -> Vec<usize> {
         // The cost grows with the distance, so one upward and one downward sweep find the best predecessors.
         let mut from: Vec<usize> = (0..n).collect();
         for k in 1..n {
-            if gains[k - 1] - CHANGE * STEP > gains[k] {
-                (gains[k], from[k]) = (gains[k - 1] - CHANGE * STEP, from[k - 1]);
+            if gains[k - 1] - CHANGE_COST * LOG_STEP > gains[k] {
+                (gains[k], from[k]) = (gains[k - 1] - CHANGE_COST * LOG_STEP, from[k - 1]);
             }
         }
         for k in (0..n.saturating_sub(1)).rev() {
-            if gains[k + 1] - CHANGE * STEP > gains[k] {
-                (gains[k], from[k]) = (gains[k + 1] - CHANGE * STEP, from[k + 1]);
+            if gains[k + 1] - CHANGE_COST * LOG_STEP > gains[k] {
+                (gains[k], from[k]) = (gains[k + 1] - CHANGE_COST * LOG_STEP, from[k + 1]);
             }
         }
         (gains.iter_mut().zip(&window.evidence)).for_each(|(gain, e)| *gain += e);
@@ -350,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn a_beat_under_wandering_and_noise_is_found_with_its_rate_and_amplitude() {
+    fn frequency_and_amplitude_are_found_under_noise() {
         for f in [1.5, 3.0, 7.0] {
             let beat = measure(&bending(f, 0.2, 1)).expect("it beats");
             let n_frames: usize = beat.spans.iter().map(|s| s.frames[1] - s.frames[0]).sum();
@@ -363,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn wandering_and_noise_alone_are_hardly_ever_taken_for_a_beat() {
+    fn noise_is_rarely_taken_for_a_beat() {
         let n_frames: usize = (0..10)
             .filter_map(|seed| measure(&bending(1.0, 0.0, seed)))
             .flat_map(|beat| beat.spans)
@@ -382,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_measured_has_no_beat_and_a_gap_ends_a_span() {
+    fn gaps_end_spans_and_unmeasured_footage_has_no_beat() {
         let mut poses = bending(3.0, 0.2, 2);
         for pose in &mut poses.frames[250..350] {
             pose.bend_rad = None;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 ///
 /// The body is thick in front and tapers to the tail. The head is at `start`; the body extends from there in
 /// direction `away`.
-struct Sausage {
+struct BentFish {
     turn: f64,
     start: [f64; 2],
     away: f64,
@@ -21,7 +21,7 @@ struct Sausage {
 
 const LENGTH: f64 = 80.0;
 
-impl Sausage {
+impl BentFish {
     fn at(&self, s: f64) -> [f64; 2] {
         let n = 200;
         let (mut p, ds) = (self.start, s * LENGTH / f64::from(n));
@@ -46,7 +46,7 @@ impl Sausage {
         };
         let spine: Vec<([f64; 2], f64)> = (0..=160)
             .map(|k| f64::from(k) / 160.0)
-            .map(|s| (self.at(s), Sausage::radius(s)))
+            .map(|s| (self.at(s), BentFish::radius(s)))
             .collect();
         let mut image = RgbaImage::new(rect.w, rect.h);
         for (k, pixel) in image.pixels.chunks_exact_mut(4).enumerate() {
@@ -96,9 +96,9 @@ impl Sausage {
         }
     }
 
-    fn traced(&self) -> Vec<[f64; 2]> {
+    fn midline(&self) -> Vec<[f64; 2]> {
         let (sighting, image) = self.sighting();
-        midline(&sighting, &image, &self.pose())
+        extract(&sighting, &image, &self.pose())
             .expect("it has an outline")
             .points
     }
@@ -119,14 +119,14 @@ impl Sausage {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     #[test]
-    fn a_bent_sausage_has_its_own_midline_to_a_pixel_whichever_way_it_lies(
+    fn the_midline_of_a_bent_fish_is_within_one_pixel(
         turn in -2.2f64..2.2, away in -3.1f64..3.1, dx in 0.0f64..1.0, dy in 0.0f64..1.0,
     ) {
-        let sausage = Sausage { turn, start: [120.0 + dx, 110.0 + dy], away };
-        let found = sausage.traced();
-        prop_assert!(sausage.error_px(&found) < 1.0, "{} px", sausage.error_px(&found));
-        prop_assert!(distance(found[0], sausage.at(-0.04)) < 4.0, "head first: {:?}", found[0]);
-        prop_assert!(distance(found[10], sausage.at(1.0)) < 3.5, "tail last: {:?}", found[10]);
+        let fish = BentFish { turn, start: [120.0 + dx, 110.0 + dy], away };
+        let found = fish.midline();
+        prop_assert!(fish.error_px(&found) < 1.0, "{} px", fish.error_px(&found));
+        prop_assert!(distance(found[0], fish.at(-0.04)) < 4.0, "head first: {:?}", found[0]);
+        prop_assert!(distance(found[10], fish.at(1.0)) < 3.5, "tail last: {:?}", found[10]);
         // The centers of the outer thirds are two thirds of the length apart.
         prop_assert!((bend_rad(&found) - turn * 2.0 / 3.0).abs() < 0.12, "{}", bend_rad(&found));
     }
@@ -146,8 +146,8 @@ fn poses(view: View, pose: Pose) -> Poses {
     }
 }
 
-fn track(sausage: &Sausage) -> Track {
-    let (mut sighting, image) = sausage.sighting();
+fn track(fish: &BentFish) -> Track {
+    let (mut sighting, image) = fish.sighting();
     let scratch = Arc::new(InMemory::default());
     sighting.at = scratch.put(&image.pixels).expect("memory has room");
     let sighting = Some(sighting);
@@ -163,14 +163,14 @@ fn track(sausage: &Sausage) -> Track {
     }
 }
 
-const BENT: Sausage = Sausage {
+const BENT: BentFish = BentFish {
     turn: 1.0,
     start: [80.0, 80.0],
     away: 0.4,
 };
 
 #[test]
-fn from_the_side_only_an_animal_far_longer_than_high_has_a_midline() {
+fn in_side_view_only_elongated_animals_have_a_midline() {
     let high = Pose {
         height_px: Some(40.0),
         ..BENT.pose()
@@ -195,21 +195,21 @@ fn an_unknown_heading_leaves_the_midline_unknown() {
 }
 
 #[test]
-fn an_outline_whose_ends_cannot_be_told_falls_back_to_its_cross_sections() {
+fn implausible_midlines_are_replaced_by_cross_sections() {
     // The measured length of 1000 makes every midline from the outline look too short.
     let pose = Pose {
         length_px: Some(1000.0),
         ..BENT.pose()
     };
     let (sighting, image) = BENT.sighting();
-    let found = midline(&sighting, &image, &pose).expect("it has sections");
+    let found = extract(&sighting, &image, &pose).expect("it has sections");
     assert_eq!(found.points.len(), N_POINTS);
     assert!(BENT.error_px(&found.points) < 3.0);
     assert!(distance(found.points[0], BENT.at(0.0)) < 10.0, "head first");
 }
 
 #[test]
-fn a_line_bent_by_a_quarter_circle_says_so_and_a_straight_one_says_0() {
+fn bend_of_a_right_angle_is_a_quarter_circle() {
     let straight: Vec<[f64; 2]> = (0..N_POINTS).map(|k| [-(k as f64), 3.0]).collect();
     assert_eq!(bend_rad(&straight), 0.0);
     let corner = [[0.0, 0.0], [-3.0, 0.0], [-3.0, 3.0]];
@@ -217,7 +217,7 @@ fn a_line_bent_by_a_quarter_circle_says_so_and_a_straight_one_says_0() {
 }
 
 #[test]
-fn a_head_broad_with_eyes_begins_between_them() {
+fn the_midline_of_a_broad_head_begins_between_its_eyes() {
     // A hammer-shaped head with an eye at each corner, and a long thin tail.
     let rect = Rect::of_size(120, 60);
     let mut image = RgbaImage::new(rect.w, rect.h);
@@ -236,7 +236,7 @@ fn a_head_broad_with_eyes_begins_between_them() {
         length_px: Some(95.0),
         ..Pose::default()
     };
-    let found = midline(&sighting, &image, &pose);
+    let found = extract(&sighting, &image, &pose);
     let found = found.expect("it has an outline").points;
     assert!((found[0][1] - 30.0).abs() < 2.0, "head: {:?}", found[0]);
     assert!(

@@ -4,24 +4,24 @@
 use super::distance;
 
 /// How far one side may run ahead to find a nearer partner, as a share of the outline.
-const WIGGLE: f64 = 0.025;
+const MAX_LEAD: f64 = 0.025;
 
 /// Returns the midline from `head` to `tail`, two indices of a closed outline. The points are unevenly
 /// spaced.
-pub(super) fn walk(outline: &[[f64; 2]], head: usize, tail: usize) -> Vec<[f64; 2]> {
+pub(super) fn midpoints(outline: &[[f64; 2]], head: usize, tail: usize) -> Vec<[f64; 2]> {
     let n = outline.len();
     let n_after = (tail + n - head) % n;
     let n_before = n - n_after;
     let after = |k: usize| outline[(head + k.min(n_after)) % n];
     let before = |k: usize| outline[(head + n - k.min(n_before)) % n];
-    let wiggle = (WIGGLE * n as f64).round() as usize;
+    let max_lead = (MAX_LEAD * n as f64).round() as usize;
     let mut midline = vec![outline[head]];
     let (mut a, mut b) = (1, 1);
     while a < n_after && b < n_before {
-        // One side may run ahead by up to `wiggle` points to where it is nearest to the other.
-        let ahead = (0..=wiggle)
+        // One side may run ahead by up to `max_lead` points to where it is nearest to the other.
+        let ahead = (0..=max_lead)
             .map(|k| (a + k, b))
-            .chain((1..=wiggle).map(|k| (a, b + k)))
+            .chain((1..=max_lead).map(|k| (a, b + k)))
             .filter(|&(a, b)| a < n_after && b < n_before);
         let nearest = ahead.fold((f64::INFINITY, (a, b)), |best, (a, b)| {
             let apart = distance(after(a), before(b));

@@ -26,7 +26,7 @@ use super::read_ahead::Batches;
 use super::scene::{Placed, Scene};
 use super::silhouette::{self, tether};
 use super::subject::{LEAST_AREA_PX, Look};
-use super::{Error, LEAST_FRAMES, Params};
+use super::{Error, MIN_FRAMES, Params};
 use crate::geometry::Rect;
 use crate::library::Mover;
 use crate::progress::Progress;
@@ -113,17 +113,17 @@ pub fn follow(
         };
         let of_batch: Result<Vec<Seen>, Full> = batch.par_iter().enumerate().map(of).collect();
         seen.extend(of_batch?);
-        batches.give_back(batch);
+        batches.recycle(batch);
         let share = seen.len() as f64 / n_frames_hint.max(1) as f64;
         progress.report("tracking", share);
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }
     }
-    if seen.len() < LEAST_FRAMES {
+    if seen.len() < MIN_FRAMES {
         return Err(Error::TooFewFrames {
             n_frames: seen.len(),
-            least: LEAST_FRAMES,
+            least: MIN_FRAMES,
         });
     }
     let candidates: Vec<&[Candidate]> = seen.iter().map(|s| s.candidates.as_slice()).collect();

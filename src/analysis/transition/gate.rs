@@ -15,8 +15,8 @@ const TURN_GATE_RAD_PER_S: f64 = TAU / 18.0;
 
 /// Decides which pairs of clips pass.
 pub(super) struct Gate {
-    mean_heading_rad: Vec<Option<f64>>,
-    turn_rate_rad_per_s: Vec<Option<f64>>,
+    /// `None` where a heading is unknown or the headings cancel.
+    clips: Vec<Option<ClipMotion>>,
     view: View,
     heading_gate_rad: f64,
     /// The compared quantity of each clip as a fraction of a circle, 2^32 units to the circle, so that
@@ -24,6 +24,22 @@ pub(super) struct Gate {
     units: Vec<u32>,
     /// Largest difference that may pass, in the same units, with a margin for rounding.
     max_gap_units: u32,
+}
+
+/// Direction and turn of the animal during a clip.
+#[derive(Clone, Copy)]
+struct ClipMotion {
+    mean_heading_rad: f64,
+    turn_rate_rad_per_s: f64,
+}
+
+impl ClipMotion {
+    fn mirrored(self) -> ClipMotion {
+        ClipMotion {
+            mean_heading_rad: mirrored_rad(self.mean_heading_rad),
+            turn_rate_rad_per_s: -self.turn_rate_rad_per_s,
+        }
+    }
 }
 
 /// Units per radian. Rounding errors are far below any relevant difference.
@@ -39,32 +55,26 @@ impl Gate {
     /// Computes the gate for every clip of the footage.
     pub(super) fn new(poses: &Poses, clip_frames: usize, params: &Params) -> Gate {
         let headings: Vec<Option<f64>> = poses.frames.iter().map(|pose| pose.heading_rad).collect();
-        let per_clip = |value: fn(&[f64]) -> Option<f64>| -> Vec<Option<f64>> {
-            headings
-                .windows(clip_frames)
-                .map(|clip| clip.iter().copied().collect::<Option<Vec<f64>>>())
-                .map(|clip| value(&clip?))
-                .collect()
+        let motion = |clip: &[Option<f64>]| {
+            let headings_rad: Vec<f64> = clip.iter().copied().collect::<Option<_>>()?;
+            Some(ClipMotion {
+                mean_heading_rad: mean_rad(headings_rad.iter().copied())?,
+                turn_rate_rad_per_s: turn_rate(&headings_rad) * poses.fps,
+            })
         };
-        let rad_per_frame = per_clip(|clip| Some(turn_rate(clip)));
-        let mean_heading_rad = per_clip(|clip| mean_rad(clip.iter().copied()));
-        let turn_rate_rad_per_s: Vec<Option<f64>> = rad_per_frame
-            .into_iter()
-            .map(|rate| Some(rate? * poses.fps))
-            .collect();
+        let clips: Vec<_> = headings.windows(clip_frames).map(motion).collect();
         let heading_gate_rad = params.heading_gate_deg.to_radians();
-        let (compared, max_gap) = match poses.view {
-            View::Side => (&mean_heading_rad, heading_gate_rad),
-            View::Top => (&turn_rate_rad_per_s, TURN_GATE_RAD_PER_S * RATE_SCALE),
+        let max_gap_rad = match poses.view {
+            View::Side => heading_gate_rad,
+            View::Top => TURN_GATE_RAD_PER_S * RATE_SCALE,
         };
+        let units = clips
+            .iter()
+            .map(|clip| clip.map_or(0, |clip| units(poses.view, clip)));
         Gate {
-            units: compared
-                .iter()
-                .map(|v| units(poses.view, v.unwrap_or(0.0)))
-                .collect(),
-            max_gap_units: ((max_gap * UNITS_PER_RAD).ceil() as u32).saturating_add(4),
-            mean_heading_rad,
-            turn_rate_rad_per_s,
+            units: units.collect(),
+            max_gap_units: ((max_gap_rad * UNITS_PER_RAD).ceil() as u32).saturating_add(4),
+            clips,
             view: poses.view,
             heading_gate_rad,
         }
@@ -75,15 +85,15 @@ impl Gate {
     /// Every pair that passes is marked, and few others. The test uses integers, because it runs on every
     /// pair of the footage.
     pub(super) fn mark_passing(&self, i: usize, mirrored: bool, row: &mut Marks) {
-        let turned = match (self.view, mirrored) {
+        let as_shown = match (self.view, mirrored) {
             // Mirroring turns a heading h into pi - h and reverses a turning rate.
             (_, false) => |units: u32| units,
             (View::Side, true) => |units: u32| (1u32 << 31).wrapping_sub(units),
             (View::Top, true) => |units: u32| units.wrapping_neg(),
         };
-        let here = turned(self.units[i]);
-        row.mark_where(&self.units[i..], |&there| {
-            let gap = here.wrapping_sub(there) as i32;
+        let units = as_shown(self.units[i]);
+        row.mark_where(&self.units[i..], |&other| {
+            let gap = units.wrapping_sub(other) as i32;
             gap.unsigned_abs() <= self.max_gap_units
         });
     }
@@ -94,24 +104,25 @@ impl Gate {
     /// A mirrored pair compares heading i with pi - heading j, and turning rate i with minus turning rate j.
     /// A clip with an unknown heading never passes.
     pub(super) fn passing_gap_rad(&self, i: usize, j: usize, mirrored: bool) -> Option<f64> {
-        let (a, b) = (self.mean_heading_rad[i]?, self.mean_heading_rad[j]?);
-        let gap_rad = wrap_rad(a - if mirrored { mirrored_rad(b) } else { b }).abs();
+        let (a, b) = (self.clips[i]?, self.clips[j]?);
+        let b = if mirrored { b.mirrored() } else { b };
+        let gap_rad = wrap_rad(a.mean_heading_rad - b.mean_heading_rad).abs();
         let passes = match self.view {
             View::Side => gap_rad < self.heading_gate_rad,
             View::Top => {
-                let (a, b) = (self.turn_rate_rad_per_s[i]?, self.turn_rate_rad_per_s[j]?);
-                (a - if mirrored { -b } else { b }).abs() < TURN_GATE_RAD_PER_S
+                (a.turn_rate_rad_per_s - b.turn_rate_rad_per_s).abs() < TURN_GATE_RAD_PER_S
             }
         };
         passes.then_some(gap_rad)
     }
 }
 
-/// Returns a heading or a turning rate in units of a circle.
-fn units(view: View, value: f64) -> u32 {
+/// Returns the compared quantity of a clip in units of a circle.
+fn units(view: View, clip: ClipMotion) -> u32 {
+    let max_rate = MAX_TURN_RATE_RAD_PER_S;
     let rad = match view {
-        View::Side => value,
-        View::Top => value.clamp(-MAX_TURN_RATE_RAD_PER_S, MAX_TURN_RATE_RAD_PER_S) * RATE_SCALE,
+        View::Side => clip.mean_heading_rad,
+        View::Top => clip.turn_rate_rad_per_s.clamp(-max_rate, max_rate) * RATE_SCALE,
     };
     (rad * UNITS_PER_RAD).round() as i64 as u32
 }
@@ -197,19 +208,13 @@ mod tests {
     /// Returns the difference of a pair minus the gate, radians or radians per second. Positive pairs do not
     /// pass.
     fn excess(gate: &Gate, i: usize, j: usize, mirrored: bool) -> f64 {
-        let of = |values: &[Option<f64>], k: usize| values[k].expect("every heading is known");
+        let clip = |k: usize| gate.clips[k].expect("every heading is known");
+        let (a, b) = (clip(i), clip(j));
+        let b = if mirrored { b.mirrored() } else { b };
         if gate.view == View::Top {
-            let rate = |k| of(&gate.turn_rate_rad_per_s, k);
-            let other = if mirrored { -rate(j) } else { rate(j) };
-            return (rate(i) - other).abs() - TURN_GATE_RAD_PER_S;
+            return (a.turn_rate_rad_per_s - b.turn_rate_rad_per_s).abs() - TURN_GATE_RAD_PER_S;
         }
-        let heading = |k| of(&gate.mean_heading_rad, k);
-        let other = if mirrored {
-            mirrored_rad(heading(j))
-        } else {
-            heading(j)
-        };
-        wrap_rad(heading(i) - other).abs() - gate.heading_gate_rad
+        wrap_rad(a.mean_heading_rad - b.mean_heading_rad).abs() - gate.heading_gate_rad
     }
 
     proptest::proptest! {
@@ -219,10 +224,10 @@ mod tests {
             whole: bool, from_above: bool, mirrored: bool,
         ) {
             // Whole degrees sometimes lie exactly on the limit of the gate.
-            let headings: Vec<f64> = match whole {
-                true => headings_deg.iter().map(|h| h.round()).collect(),
-                false => headings_deg,
-            };
+            let mut headings = headings_deg;
+            if whole {
+                headings.iter_mut().for_each(|heading| *heading = heading.round());
+            }
             let gate = gate(if from_above { View::Top } else { View::Side }, &headings);
             for i in 0..headings.len() - 1 {
                 let mut row = Marks::none(headings.len() - 1 - i);

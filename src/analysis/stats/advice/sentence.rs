@@ -10,13 +10,13 @@ impl Advice {
     /// Writes the sentences about other moving objects, other scenes and the view.
     fn write_scene(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Advice::OtherMovers(n, mover) => write_movers(f, *n, mover),
-            Advice::ForeignFrames(n, from_s) => write!(
+            Advice::OtherMovers { n, longest } => write_movers(f, *n, longest),
+            Advice::ForeignFrames { n, first_s } => write!(
                 f,
-                "{n} frames show another scene, the first at {from_s:.1} s, and are not measured: cut them out of the \
+                "{n} frames show another scene, the first at {first_s:.1} s, and are not measured: cut them out of the \
                  film"
             ),
-            Advice::ViewUnsure(view, probability) => {
+            Advice::ViewUnsure { view, probability } => {
                 let (seen, other) = match view {
                     View::Side => ("from the side", "top"),
                     View::Top => ("from above", "side"),
@@ -48,7 +48,7 @@ impl Motion {
         }
     }
 
-    fn lacking(self, f: &mut fmt::Formatter<'_>, playable_s: f64, filmed_s: f64) -> fmt::Result {
+    fn write_lack(self, f: &mut fmt::Formatter<'_>, playable_s: f64, filmed_s: f64) -> fmt::Result {
         let words = self.names().1;
         match (playable_s > 0.0, filmed_s > 0.0) {
             (false, false) => write!(
@@ -80,9 +80,9 @@ impl fmt::Display for Advice {
                 f,
                 "several animals move in the film, and the largest was followed: film a single animal"
             ),
-            Advice::OtherMovers(..) | Advice::ForeignFrames(..) | Advice::ViewUnsure(..) => {
-                self.write_scene(f)
-            }
+            Advice::OtherMovers { .. }
+            | Advice::ForeignFrames { .. }
+            | Advice::ViewUnsure { .. } => self.write_scene(f),
             Advice::SeldomFound(share) => write!(
                 f,
                 "the animal was found in only {} of the frames: point at it (animal_at) if it rests for long; \
@@ -99,9 +99,9 @@ impl fmt::Display for Advice {
                 "no moment of the footage is similar to an earlier one, so playback always ends and no flock can be \
                  made: film for longer"
             ),
-            Advice::LittlePlayback(share, seconds) => write!(
+            Advice::LittlePlayback { share, duration_s } => write!(
                 f,
-                "endless playback can use only {} of the footage ({seconds:.1} s): film for longer",
+                "endless playback can use only {} of the footage ({duration_s:.1} s): film for longer",
                 percent(share)
             ),
             Advice::FewJumps(n) => write!(
@@ -118,9 +118,11 @@ impl fmt::Display for Advice {
                 "the animal moves in only {} of the playable frames: film it while it is active",
                 percent(share)
             ),
-            Advice::Lacks(motion, playable_s, filmed_s) => {
-                motion.lacking(f, *playable_s, *filmed_s)
-            }
+            Advice::Lacks {
+                motion,
+                playable_s,
+                filmed_s,
+            } => motion.write_lack(f, *playable_s, *filmed_s),
         }
     }
 }

@@ -10,18 +10,18 @@ use crate::analysis::track::asymmetry::{Asymmetry, N_NUMBERS};
 
 /// Least ratio of the standard deviations along and across the axis. Free choice: round silhouettes have no
 /// ends.
-const LONG: f64 = 1.25;
+const MIN_ELONGATION: f64 = 1.25;
 /// Least number of frames to estimate the difference between the ends. Free choice.
-const LEAST_FRAMES: usize = 8;
+const MIN_FRAMES: usize = 8;
 /// Iterations of the power method. Free choice.
-const N_ROUNDS: usize = 64;
+const N_ITERATIONS: usize = 64;
 /// Greatest evidence of one frame, half the log-odds. Free choice.
-const MOST: f64 = 4.0;
+const MAX_HALF_LOG_ODDS: f64 = 4.0;
 /// Least standard deviation of scores, as a share of their mean. Free choice: changing light varies every
 /// film.
-const LEAST_SPREAD: f64 = 0.25;
+const MIN_SPREAD: f64 = 0.25;
 /// Greatest speed that counts, body lengths per second. Free choice.
-const MOST_SPEED: f64 = 1.0;
+const MAX_SPEED_BL_S: f64 = 1.0;
 /// Length of the spans over which speeds are averaged, seconds. Their scatter gives the certainty. Free
 /// choice.
 const SPAN_S: f64 = 0.5;
@@ -29,71 +29,64 @@ const SPAN_S: f64 = 0.5;
 /// Least |cosine| of the angle between the length axis and the axis of the moments. Free choice.
 ///
 /// At larger angles, the ends of the moments are not those of the length axis.
-const SAME_AXIS: f64 = 0.7;
+const MIN_AXIS_COSINE: f64 = 0.7;
 
 /// Evidence for the head from the appearance of the ends.
-pub(super) struct Ends {
+pub(super) struct HeadEvidence {
     /// Half the log-odds that the head lies toward +axis, for each frame; `None` when the ends say nothing.
-    pub(super) evidence: Vec<Option<f64>>,
-    /// Probability that the animal mostly moves head first, 0.5..=1: that `evidence` has the right sign.
+    pub(super) half_log_odds: Vec<Option<f64>>,
+    /// Probability that the animal mostly moves head first, 0.5..=1: that `half_log_odds` has the right sign.
     /// `None` without evidence.
     certainty: Option<f64>,
 }
 
-impl Ends {
+impl HeadEvidence {
     /// Estimates the evidence of all frames. `speed` is the speed along +axis, body lengths per second.
-    pub(super) fn tell(
+    pub(super) fn estimate(
         track: &[Tracked],
         axes: &[Option<Axes>],
         speed: &[Option<f64>],
         fps: f64,
-    ) -> Ends {
-        let seen: Vec<Option<&Asymmetry>> = track.iter().map(usable).collect();
-        let whole: Vec<&Asymmetry> = seen
+    ) -> HeadEvidence {
+        let seen: Vec<Option<&Asymmetry>> = track.iter().map(long_asymmetry).collect();
+        let uncut: Vec<&Asymmetry> = seen
             .iter()
             .zip(track)
             .filter(|(_, tracked)| tracked.sighting.as_ref().is_some_and(|s| !s.cut))
             .filter_map(|(seen, _)| *seen)
             .collect();
-        if whole.len() < LEAST_FRAMES {
-            return Ends {
-                evidence: vec![None; track.len()],
+        if uncut.len() < MIN_FRAMES {
+            return HeadEvidence {
+                half_log_odds: vec![None; track.len()],
                 certainty: None,
             };
         }
-        let principal = principal_axis(&whole);
-        let n = whole.len() as f64;
-        let mean = whole
-            .iter()
-            .map(|a| score(a, &principal).abs())
-            .sum::<f64>()
-            / n;
-        let square = whole
-            .iter()
-            .map(|a| score(a, &principal).powi(2))
-            .sum::<f64>()
-            / n;
+        let principal = principal_axis(&uncut);
+        let n = uncut.len() as f64;
+        let scores = || uncut.iter().map(|a| score(a, &principal));
+        let mean = scores().map(f64::abs).sum::<f64>() / n;
+        let square = scores().map(|score| score.powi(2)).sum::<f64>() / n;
         let variance = (square - mean * mean)
-            .max((LEAST_SPREAD * mean).powi(2))
+            .max((MIN_SPREAD * mean).powi(2))
             .max(1e-12);
-        let one = |k: usize| {
+        let half_log_odds_of = |k: usize| {
             let major_rad = track[k].sighting.as_ref()?.moments.major_rad?;
             let same = libm::cos(axes[k].as_ref()?.axis_rad? - major_rad);
-            let evidence = (mean * score(seen[k]?, &principal) / variance).clamp(-MOST, MOST);
-            (same.abs() > SAME_AXIS).then_some(same.signum() * evidence)
+            let evidence = (mean * score(seen[k]?, &principal) / variance)
+                .clamp(-MAX_HALF_LOG_ODDS, MAX_HALF_LOG_ODDS);
+            (same.abs() > MIN_AXIS_COSINE).then_some(same.signum() * evidence)
         };
-        let mut evidence: Vec<Option<f64>> = (0..track.len()).map(one).collect();
-        let forward = forward(&evidence, speed, fps);
-        if forward < 0.0 {
-            evidence
-                .iter_mut()
-                .flatten()
-                .for_each(|evidence| *evidence = -*evidence);
+        let mut half_log_odds: Vec<Option<f64>> = (0..track.len()).map(half_log_odds_of).collect();
+        let t = t_statistic(&half_log_odds, speed, fps);
+        if t < 0.0 {
+            for half_log_odds in half_log_odds.iter_mut().flatten() {
+                *half_log_odds = -*half_log_odds;
+            }
         }
-        Ends {
-            evidence,
+        HeadEvidence {
+            half_log_odds,
             // The logistic function of 1.7 t differs from the normal distribution by less than 0.01.
-            certainty: Some(1.0 / (1.0 + libm::exp(-1.7 * forward.abs()))),
+            certainty: Some(1.0 / (1.0 + libm::exp(-1.7 * t.abs()))),
         }
     }
 
@@ -105,9 +98,9 @@ impl Ends {
     }
 }
 
-fn usable(tracked: &Tracked) -> Option<&Asymmetry> {
+fn long_asymmetry(tracked: &Tracked) -> Option<&Asymmetry> {
     let sighting = tracked.sighting.as_ref()?;
-    let is_long = sighting.moments.eigenvalue_ratio >= LONG * LONG;
+    let is_long = sighting.moments.eigenvalue_ratio >= MIN_ELONGATION * MIN_ELONGATION;
     sighting.asymmetry.as_ref().filter(|_| is_long)
 }
 
@@ -118,7 +111,7 @@ fn principal_axis(all: &[&Asymmetry]) -> [f64; N_NUMBERS] {
         square(a).total_cmp(&square(b))
     });
     let mut axis = largest.map_or([0.0; N_NUMBERS], |a| a.ends.map(f64::from));
-    for _ in 0..N_ROUNDS {
+    for _ in 0..N_ITERATIONS {
         let mut next = [0.0; N_NUMBERS];
         for asymmetry in all {
             let score = score(asymmetry, &axis);
@@ -145,15 +138,15 @@ fn score(asymmetry: &Asymmetry, axis: &[f64; N_NUMBERS]) -> f64 {
 ///
 /// It is the sum over spans of the mean speed toward that end, divided by its standard deviation if both
 /// directions were equally likely.
-fn forward(evidence: &[Option<f64>], speed_bl_s: &[Option<f64>], fps: f64) -> f64 {
+fn t_statistic(evidence: &[Option<f64>], speed_bl_s: &[Option<f64>], fps: f64) -> f64 {
     let span = ((SPAN_S * fps).round() as usize).max(1);
     let spans = evidence
         .chunks(span)
         .zip(speed_bl_s.chunks(span))
         .map(|(evidence, speeds)| {
             let along = |(evidence, speed): (&Option<f64>, &Option<f64>)| {
-                let sign = (evidence.as_ref()? / MOST).clamp(-1.0, 1.0);
-                Some(sign * speed.as_ref()?.clamp(-MOST_SPEED, MOST_SPEED))
+                let sign = (evidence.as_ref()? / MAX_HALF_LOG_ODDS).clamp(-1.0, 1.0);
+                Some(sign * speed.as_ref()?.clamp(-MAX_SPEED_BL_S, MAX_SPEED_BL_S))
             };
             evidence.iter().zip(speeds).filter_map(along).sum::<f64>() / span as f64
         });
@@ -168,7 +161,7 @@ fn forward(evidence: &[Option<f64>], speed_bl_s: &[Option<f64>], fps: f64) -> f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::pose::painted::{Look, fish};
+    use crate::analysis::pose::synthetic::{Appearance, fish};
 
     const FPS: f64 = 30.0;
     const N_FRAMES: usize = 240;
@@ -179,12 +172,12 @@ mod tests {
     }
 
     /// Returns the ends of an animal that moves head first at `forward(k)` body lengths per second.
-    fn told(forward: impl Fn(usize) -> f64) -> Ends {
-        let look = |k| Look {
+    fn evidence_of(forward: impl Fn(usize) -> f64) -> HeadEvidence {
+        let appearance = |k| Appearance {
             is_left: is_left(k),
             is_upper_dark: true,
         };
-        let track: Vec<Tracked> = (0..N_FRAMES).map(|k| fish(k, look(k))).collect();
+        let track: Vec<Tracked> = (0..N_FRAMES).map(|k| fish(k, appearance(k))).collect();
         let axes = |tracked: &Tracked| {
             let sighting = tracked.sighting.as_ref()?;
             Some(Axes {
@@ -195,29 +188,31 @@ mod tests {
             })
         };
         let axes: Vec<Option<Axes>> = track.iter().map(axes).collect();
-        let along = |k| if is_left(k) { -forward(k) } else { forward(k) };
+        let along = |k| {
+            if is_left(k) { -forward(k) } else { forward(k) }
+        };
         let speed: Vec<Option<f64>> = (0..N_FRAMES).map(|k| Some(along(k))).collect();
-        Ends::tell(&track, &axes, &speed, FPS)
+        HeadEvidence::estimate(&track, &axes, &speed, FPS)
     }
 
     /// Returns the number of frames with the head at the wrong end.
-    fn n_wrong(ends: &Ends) -> usize {
-        let is_wrong = |k: &usize| ends.evidence[*k].is_none_or(|e| (e < 0.0) != is_left(*k));
+    fn n_wrong(ends: &HeadEvidence) -> usize {
+        let is_wrong = |k: &usize| ends.half_log_odds[*k].is_none_or(|e| (e < 0.0) != is_left(*k));
         (0..N_FRAMES).filter(is_wrong).count()
     }
 
     #[test]
-    fn heads_are_told_in_every_frame_by_the_way_the_animal_usually_moves() {
-        let ends = told(|_| 0.5);
+    fn the_usual_direction_of_motion_names_the_head_end_in_all_frames() {
+        let ends = evidence_of(|_| 0.5);
         assert_eq!(n_wrong(&ends), 0);
         assert!(ends.tempered(0.99) > 0.9);
-        let backs_off_at_times = told(|k| if k % 60 < 15 { -0.4 } else { 0.5 });
+        let backs_off_at_times = evidence_of(|k| if k % 60 < 15 { -0.4 } else { 0.5 });
         assert_eq!(n_wrong(&backs_off_at_times), 0);
     }
 
     #[test]
-    fn who_moves_to_and_fro_leaves_it_uncertain() {
-        let ends = told(|k| if k / 15 % 2 == 0 { 0.5 } else { -0.5 });
+    fn equal_motion_in_both_directions_leaves_the_head_uncertain() {
+        let ends = evidence_of(|k| if k / 15 % 2 == 0 { 0.5 } else { -0.5 });
         assert!(
             (ends.tempered(0.99) - 0.5).abs() < 0.1,
             "{}",

@@ -3,28 +3,28 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::super::Outline;
-use super::super::body::{Axes, form};
-use super::super::shape::Shape;
+use super::body::{BodyAxes, MOMENT_AXES, bilinear_form};
+use super::observations::Silhouette;
+use super::shape::Shape;
 
 pub(super) const N_YAW: usize = 36;
 pub(super) const N_PITCH: usize = 13;
 pub(super) const N_CELL: usize = N_YAW * N_PITCH;
 /// Distance between neighboring cells in yaw and in pitch, radians.
 pub(super) const YAW_STEP_RAD: f64 = TAU / N_YAW as f64;
-pub(super) const PITCH_STEP_RAD: f64 = 2.0 * STEEPEST_RAD / (N_PITCH - 1) as f64;
+pub(super) const PITCH_STEP_RAD: f64 = 2.0 * MAX_PITCH_RAD / (N_PITCH - 1) as f64;
 /// Largest pitch of a cell, radians. Free choice.
-const STEEPEST_RAD: f64 = PI / 3.0;
+const MAX_PITCH_RAD: f64 = PI / 3.0;
 /// Standard deviations of the velocity in x, y and depth, body lengths per second. Free choice.
 const MOTION_BL: [f64; 3] = [0.25, 0.25, 0.6];
 /// Standard deviation of the pitch, radians. Free choice.
-const PITCH: f64 = 0.4;
+const PITCH_NOISE: f64 = 0.4;
 /// Residuals grow linearly beyond this many standard deviations. Free choice.
-const ROBUST: f64 = 3.0;
+const HUBER: f64 = 3.0;
 
 /// The cells, with the expected measurements for each.
 pub(super) struct Cells {
-    pub(super) axes: Vec<Axes>,
+    pub(super) axes: Vec<BodyAxes>,
     pitch: [f64; N_PITCH],
     /// Projected moments xx, xy, yy, square metres.
     moments: Vec<[f64; 3]>,
@@ -33,32 +33,31 @@ pub(super) struct Cells {
     inverse: Vec<[f64; 6]>,
     half_log_det: Vec<f64>,
     /// Vertical extent by pitch, metres.
-    upright_m: [f64; N_PITCH],
+    vertical_m: [f64; N_PITCH],
 }
 
 impl Cells {
-    pub(super) fn of(shape: &Shape) -> Cells {
+    pub(super) fn new(shape: &Shape) -> Cells {
         let pitch: [f64; N_PITCH] =
-            std::array::from_fn(|j| -STEEPEST_RAD + PITCH_STEP_RAD * j as f64);
+            std::array::from_fn(|j| -MAX_PITCH_RAD + PITCH_STEP_RAD * j as f64);
         let mut cells = Cells {
             axes: Vec::with_capacity(N_CELL),
             pitch,
             moments: Vec::with_capacity(N_CELL),
             inverse: Vec::with_capacity(N_CELL),
             half_log_det: Vec::with_capacity(N_CELL),
-            upright_m: pitch.map(|p| shape.upright_m(p).0),
+            vertical_m: pitch.map(|p| shape.vertical_extent(p).m),
         };
-        let body = shape.body(0.0);
+        let body = shape.covariance_m2(0.0);
         for yaw in (0..N_YAW).map(|i| (i as f64 + 0.5) * YAW_STEP_RAD) {
             for pitch in pitch {
-                let axes = Axes::of(yaw, pitch);
-                let seen = axes.seen([0.0; 2], 1.0);
-                let pairs = [(0, 0), (0, 1), (1, 1)];
-                let moments = pairs.map(|(i, j)| form(&seen[i], &seen[j], &body));
-                let sway = pairs
+                let axes = BodyAxes::new(yaw, pitch);
+                let seen = axes.projected([0.0; 2], 1.0);
+                let moments = MOMENT_AXES.map(|(i, j)| bilinear_form(&seen[i], &seen[j], &body));
+                let sway = MOMENT_AXES
                     .map(|(i, j)| seen[i][0] * seen[j][2] + seen[i][2] * seen[j][0])
                     .map(|v| v * shape.sway_sd);
-                let (inverse, half_log_det) = precision(moments, sway, shape);
+                let (inverse, half_log_det) = inverse_covariance(moments, sway, shape);
                 cells.axes.push(axes);
                 cells.moments.push(moments);
                 cells.inverse.push(inverse);
@@ -73,31 +72,36 @@ impl Cells {
     pub(super) fn motion_costs(&self, velocity: [f64; 3], length_m: f64) -> Vec<f64> {
         let noise = MOTION_BL.map(|bl| bl * length_m);
         let moved: [f64; 3] = std::array::from_fn(|c| velocity[c] / noise[c]);
-        let one = |(k, axes): (usize, &Axes)| {
+        let cost = |(k, axes): (usize, &BodyAxes)| {
             let along: [f64; 3] = std::array::from_fn(|c| axes.forward[c] / noise[c]);
             let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
             // The speed that explains most of the velocity. Animals do not swim backward.
             let speed = (dot(&along, &moved) / dot(&along, &along)).max(0.0);
-            let rest: [f64; 3] = std::array::from_fn(|c| moved[c] - speed * along[c]);
-            let pitch = self.pitch[k % N_PITCH] / PITCH;
-            0.5 * robust(dot(&rest, &rest)) + 0.5 * pitch * pitch
+            let residual: [f64; 3] = std::array::from_fn(|c| moved[c] - speed * along[c]);
+            let pitch = self.pitch[k % N_PITCH] / PITCH_NOISE;
+            0.5 * huber_loss(dot(&residual, &residual)) + 0.5 * pitch * pitch
         };
-        self.axes.iter().enumerate().map(one).collect()
+        self.axes.iter().enumerate().map(cost).collect()
     }
 
     /// Adds the cost of the silhouette's moments to each cell. The vertical extent gives the scale.
-    pub(super) fn add_moment_costs(&self, outline: &Outline, costs: &mut [f64]) {
-        let scale = self.upright_m.map(|m| (m / outline.upright_px).powi(2));
+    pub(super) fn add_moment_costs(&self, silhouette: &Silhouette, costs: &mut [f64]) {
+        let scale = self
+            .vertical_m
+            .map(|m| (m / silhouette.vertical_px).powi(2));
         for (k, cost) in costs.iter_mut().enumerate() {
-            let r: [f64; 3] = std::array::from_fn(|c| {
-                outline.covariance_px2[c] * scale[k % N_PITCH] - self.moments[k][c]
+            let residual: [f64; 3] = std::array::from_fn(|c| {
+                silhouette.covariance_px2[c] * scale[k % N_PITCH] - self.moments[k][c]
             });
             let [a, b, c, d, e, f] = self.inverse[k];
-            let square = a * r[0] * r[0]
-                + d * r[1] * r[1]
-                + f * r[2] * r[2]
-                + 2.0 * (b * r[0] * r[1] + c * r[0] * r[2] + e * r[1] * r[2]);
-            *cost += 0.5 * robust(square) + self.half_log_det[k];
+            let square = a * residual[0] * residual[0]
+                + d * residual[1] * residual[1]
+                + f * residual[2] * residual[2]
+                + 2.0
+                    * (b * residual[0] * residual[1]
+                        + c * residual[0] * residual[2]
+                        + e * residual[1] * residual[2]);
+            *cost += 0.5 * huber_loss(square) + self.half_log_det[k];
         }
     }
 
@@ -127,12 +131,12 @@ impl Cells {
 /// determinant.
 ///
 /// The covariance adds the noise of each moment, the noise of the common scale, and the sway.
-fn precision(m: [f64; 3], sway: [f64; 3], shape: &Shape) -> ([f64; 6], f64) {
+fn inverse_covariance(m: [f64; 3], sway: [f64; 3], shape: &Shape) -> ([f64; 6], f64) {
     let mean = (m[0] * m[2]).max(0.0).sqrt();
     let noise = [0.08 * m[0] + 0.04 * mean, 0.08 * mean, 0.08 * m[2]]
         .map(|n| n * shape.moment_noise.max(1.0));
     // The vertical extent gives the scale. Moments grow with its square.
-    let scale = (2.0 * shape.upright_noise).powi(2);
+    let scale = (2.0 * shape.vertical_noise).powi(2);
     let entry = |i: usize, j: usize| {
         let own = if i == j { noise[i] * noise[i] } else { 0.0 };
         own + scale * m[i] * m[j] + sway[i] * sway[j]
@@ -151,9 +155,9 @@ fn precision(m: [f64; 3], sway: [f64; 3], shape: &Shape) -> ([f64; 6], f64) {
     (minors.map(|v| v / det), 0.5 * libm::log(det))
 }
 
-fn robust(square: f64) -> f64 {
-    if square > ROBUST * ROBUST {
-        ROBUST * (2.0 * square.sqrt() - ROBUST)
+fn huber_loss(square: f64) -> f64 {
+    if square > HUBER * HUBER {
+        HUBER * (2.0 * square.sqrt() - HUBER)
     } else {
         square
     }

@@ -9,14 +9,12 @@
 //! One course decides head or tail and toward or away together. It replaces the two separate decisions of
 //! docs/explanation/algorithms.md, "Pose".
 
-mod cells;
-mod chain;
-
-use super::energy::State;
+use super::cells::Cells;
+use super::hidden_markov;
+use super::observations::Observations;
 use super::shape::Shape;
-use super::{States, Views};
+use super::state::State;
 use crate::geometry::wrap_rad;
-use cells::Cells;
 
 /// Weight of one frame's cost at 30 frames per second. Below 1, because successive frames are not
 /// independent.
@@ -24,7 +22,7 @@ const EVIDENCE: f64 = 0.35;
 /// Cells below this probability do not count toward the confidence. Free choice.
 const NEGLIGIBLE: f64 = 1e-6;
 /// Cost of a direction away from a head given by the user. High enough to exclude it.
-const PINNED: f64 = 1e4;
+const GIVEN_HEAD_COST: f64 = 1e4;
 
 /// The decoded course.
 pub(super) struct Course {
@@ -38,36 +36,43 @@ pub(super) struct Course {
 }
 
 /// Decodes the course of the animal.
-pub(super) fn decode(views: &Views, shape: &Shape) -> Course {
-    let cells = Cells::of(shape);
-    let z_apparent_m = rough_depth_m(views, shape);
-    let velocity = velocity_m_s(views, &z_apparent_m);
-    let slopes: Vec<[f64; 2]> = views.frames.iter().map(|v| v.slope).collect();
-    let tempered = EVIDENCE * (30.0 * views.dt).min(2.0);
+pub(super) fn decode(observations: &Observations, shape: &Shape) -> Course {
+    let cells = Cells::new(shape);
+    let z_apparent_m = rough_depth_m(observations, shape);
+    let velocity = velocity_m_s(observations, &z_apparent_m);
+    let slopes: Vec<[f64; 2]> = observations
+        .frames
+        .iter()
+        .map(|frame| frame.slope)
+        .collect();
+    let evidence_weight = EVIDENCE * (30.0 * observations.dt).min(2.0);
     let cost = |k: usize| {
-        let along = about_sight(slopes[k], velocity[k]);
-        let mut cost = cells.motion_costs(along, shape.length_m);
-        if let Some(outline) = &views.frames[k].outline {
-            cells.add_moment_costs(outline, &mut cost);
+        let velocity = sight_from_camera(slopes[k], velocity[k]);
+        let mut cost = cells.motion_costs(velocity, shape.length_m);
+        if let Some(silhouette) = &observations.frames[k].silhouette {
+            cells.add_moment_costs(silhouette, &mut cost);
         }
-        let (toward, ends) = (views.frames[k].toward, views.frames[k].ends);
+        let (given_head, head_evidence) = (
+            observations.frames[k].given_head,
+            observations.frames[k].head_evidence,
+        );
         for (cost, axes) in cost.iter_mut().zip(&cells.axes) {
-            let points_away = toward.is_some_and(|[x, y]| {
+            let points_away = given_head.is_some_and(|[x, y]| {
                 let forward = axes.forward;
                 x * forward[0] + y * forward[1] < 0.0
             });
-            if let Some([x, y]) = ends {
+            if let Some([x, y]) = head_evidence {
                 *cost -= x * axes.forward[0] + y * axes.forward[1];
             }
-            *cost = *cost * tempered + if points_away { PINNED } else { 0.0 };
+            *cost = *cost * evidence_weight + if points_away { GIVEN_HEAD_COST } else { 0.0 };
         }
         cost
     };
-    let n = views.frames.len();
+    let n = observations.frames.len();
     let mut forward = vec![[0.0; 3]; n];
     let mut posterior = vec![Vec::new(); n];
-    chain::decode(n, cost, |k, cell, probability| {
-        forward[k] = camera_frame(slopes[k], cells.mean_near(probability, cell));
+    hidden_markov::decode(n, cost, |k, cell, probability| {
+        forward[k] = camera_from_sight(slopes[k], cells.mean_near(probability, cell));
         posterior[k] = (0..)
             .zip(probability)
             .filter(|(_, p)| **p > NEGLIGIBLE)
@@ -85,21 +90,21 @@ pub(super) fn decode(views: &Views, shape: &Shape) -> Course {
 
 impl Course {
     /// Returns the initial states of the energy minimisation: one body length per second and no sway.
-    pub(super) fn states(&self, views: &Views, shape: &Shape) -> States {
+    pub(super) fn initial_states(&self, observations: &Observations, shape: &Shape) -> Vec<State> {
         let mut last_yaw = 0.0;
-        (0..views.frames.len())
+        (0..observations.frames.len())
             .map(|k| {
                 let [x, y, z] = self.forward[k];
                 let yaw = last_yaw + wrap_rad(libm::atan2(z, x) - last_yaw);
                 last_yaw = yaw;
                 let pitch = libm::asin(y.clamp(-1.0, 1.0));
-                State([
-                    libm::log(self.z_apparent_m[k]),
+                State {
+                    log_z: libm::log(self.z_apparent_m[k]),
                     yaw,
                     pitch,
-                    shape.length_m,
-                    0.0,
-                ])
+                    speed: shape.length_m,
+                    sway: 0.0,
+                }
             })
             .collect()
     }
@@ -107,7 +112,7 @@ impl Course {
     /// Returns the probability of the head's side in the image and of the sign of depth, both 0.5..=1, for a
     /// direction in one frame.
     pub(super) fn confidence(&self, idx: usize, forward: [f64; 3]) -> [f64; 2] {
-        let along = about_sight(self.slopes[idx], forward);
+        let along = sight_from_camera(self.slopes[idx], forward);
         let (mut head, mut depth, mut all) = (0.0, 0.0, 0.0);
         for &(cell, p) in &self.posterior[idx] {
             let (there, p) = (self.cells.axes[usize::from(cell)].forward, f64::from(p));
@@ -124,17 +129,17 @@ impl Course {
 }
 
 /// Rotates a vector from the camera frame to the line of sight with slope (tx, ty), to first order.
-fn about_sight([tx, ty]: [f64; 2], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    normalized_like([x, y, z], [x - tx * z, y - ty * z, z + tx * x + ty * y])
+fn sight_from_camera([tx, ty]: [f64; 2], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    with_length_of([x, y, z], [x - tx * z, y - ty * z, z + tx * x + ty * y])
 }
 
-/// Rotates a vector from the line of sight to the camera frame; approximate inverse of [`about_sight`].
-fn camera_frame([tx, ty]: [f64; 2], [x, y, z]: [f64; 3]) -> [f64; 3] {
-    normalized_like([x, y, z], [x + tx * z, y + ty * z, z - tx * x - ty * y])
+/// Rotates a vector from the line of sight to the camera frame; approximate inverse of [`sight_from_camera`].
+fn camera_from_sight([tx, ty]: [f64; 2], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    with_length_of([x, y, z], [x + tx * z, y + ty * z, z - tx * x - ty * y])
 }
 
 /// Returns `b` scaled to the length of `a`.
-fn normalized_like(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+fn with_length_of(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     let norm = |v: [f64; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
     let scale = if norm(b) > 0.0 {
         norm(a) / norm(b)
@@ -146,14 +151,14 @@ fn normalized_like(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 /// Returns the apparent depth from the vertical extent, metres, averaged over 0.5 s. Frames without a
 /// silhouette are interpolated.
-fn rough_depth_m(views: &Views, shape: &Shape) -> Vec<f64> {
-    let seen: Vec<(usize, f64)> = views
-        .frames
-        .iter()
-        .enumerate()
-        .filter_map(|(k, v)| Some((k, shape.level_depth_m(views, v.outline.as_ref()?))))
+fn rough_depth_m(observations: &Observations, shape: &Shape) -> Vec<f64> {
+    let seen: Vec<(usize, f64)> = (observations.frames.iter().enumerate())
+        .filter_map(|(k, frame)| {
+            let silhouette = frame.silhouette.as_ref()?;
+            Some((k, shape.level_depth_m(observations, silhouette)))
+        })
         .collect();
-    let mut depth = vec![seen[0].1; views.frames.len()];
+    let mut depth = vec![seen[0].1; observations.frames.len()];
     for pair in seen.windows(2) {
         let [(a, from), (b, to)] = [pair[0], pair[1]];
         for k in a..=b {
@@ -163,32 +168,32 @@ fn rough_depth_m(views: &Views, shape: &Shape) -> Vec<f64> {
     if let Some(&(last, value)) = seen.last() {
         depth[last..].fill(value);
     }
-    running_mean(&depth, views, 0.5)
+    running_mean(&depth, observations, 0.5)
 }
 
 /// Returns the smoothed velocity in the camera frame, metres per second.
-fn velocity_m_s(views: &Views, z_apparent_m: &[f64]) -> Vec<[f64; 3]> {
-    let n = views.frames.len();
-    let part = |c: usize, over_s: f64| {
+fn velocity_m_s(observations: &Observations, z_apparent_m: &[f64]) -> Vec<[f64; 3]> {
+    let n = observations.frames.len();
+    let component = |c: usize, over_s: f64| {
         let place = |k: usize| match c {
-            2 => views.medium_index * z_apparent_m[k],
-            _ => views.frames[k].slope[c] * z_apparent_m[k],
+            2 => observations.medium_index * z_apparent_m[k],
+            _ => observations.frames[k].slope[c] * z_apparent_m[k],
         };
         let rate: Vec<f64> = (0..n)
             .map(|k| {
                 let (a, b) = (k.saturating_sub(1), (k + 1).min(n - 1));
-                (place(b) - place(a)) / ((b - a).max(1) as f64 * views.dt)
+                (place(b) - place(a)) / ((b - a).max(1) as f64 * observations.dt)
             })
             .collect();
-        running_mean(&rate, views, over_s)
+        running_mean(&rate, observations, over_s)
     };
-    let (x, y, z) = (part(0, 0.23), part(1, 0.23), part(2, 0.3));
+    let (x, y, z) = (component(0, 0.23), component(1, 0.23), component(2, 0.3));
     (0..n).map(|k| [x[k], y[k], z[k]]).collect()
 }
 
 /// Returns the mean over a window of `over_s` seconds around each value; the window is shorter at the ends.
-fn running_mean(values: &[f64], views: &Views, over_s: f64) -> Vec<f64> {
-    let half = (over_s / views.dt / 2.0).round() as usize;
+fn running_mean(values: &[f64], observations: &Observations, over_s: f64) -> Vec<f64> {
+    let half = (over_s / observations.dt / 2.0).round() as usize;
     (0..values.len())
         .map(|k| {
             let window = &values[k.saturating_sub(half)..(k + half + 1).min(values.len())];

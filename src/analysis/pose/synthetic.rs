@@ -7,7 +7,7 @@ use crate::raster::RgbaImage;
 
 /// Appearance of the animal.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Look {
+pub(super) struct Appearance {
     /// Whether the head is at the left end.
     pub(super) is_left: bool,
     /// Whether the upper half is darker than the lower half.
@@ -18,17 +18,21 @@ const WIDTH: u32 = 60;
 const HEIGHT: u32 = 30;
 
 /// Returns the animal in one frame, with a little noise in its color.
-pub(super) fn fish(frame_idx: usize, look: Look) -> Tracked {
+pub(super) fn fish(frame_idx: usize, appearance: Appearance) -> Tracked {
     let mut matte = RgbaImage::new(WIDTH, HEIGHT);
     for y in 0..HEIGHT {
         for x in 0..WIDTH {
             let along = (f64::from(x) + 0.5) / f64::from(WIDTH);
-            let to_head = if look.is_left { 1.0 - along } else { along };
+            let to_head = if appearance.is_left {
+                1.0 - along
+            } else {
+                along
+            };
             let across = f64::from(y) + 0.5 - f64::from(HEIGHT) / 2.0;
             let half_width = 12.0 * (3.0 * to_head * to_head * (1.0 - to_head)).sqrt() / 0.667;
             if across.abs() < half_width {
                 let noise = (x * 7 + y * 13 + frame_idx as u32 * 11) % 9;
-                let is_dark = (across < 0.0) == look.is_upper_dark;
+                let is_dark = (across < 0.0) == appearance.is_upper_dark;
                 let level = if is_dark { 70 } else { 150 } + noise as u8;
                 matte.set_pixel(x, y, [level, level, level, 255]);
             }
