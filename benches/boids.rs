@@ -4,7 +4,7 @@
 //! Arguments: COUNT STEPS. Simulates a school in a flat tank, on one thread and on all. Prints one line of
 //! JSON with the seconds per step.
 
-use std::time::Instant;
+mod timing;
 
 use flockreel::flock::Params;
 use flockreel::flock::boids::Boids;
@@ -13,12 +13,10 @@ use flockreel::flock::boids::tank::Tank;
 use flockreel::flock::lens::Lens;
 
 /// Area of the tank per boid, square body lengths.
-const ROOM_BL2: f64 = 1.5;
+const AREA_PER_BOID_BL2: f64 = 1.5;
 
 fn main() {
-    let arguments: Vec<String> = (std::env::args().skip(1))
-        .filter(|argument| argument != "--bench")
-        .collect();
+    let arguments: Vec<String> = timing::arguments().collect();
     let [count, steps] = &arguments[..] else {
         // `cargo test --benches` runs this program without arguments.
         return println!("arguments: COUNT STEPS");
@@ -45,19 +43,11 @@ fn time(count: u32, steps: u32, n_threads: usize) -> f64 {
         wander_rad_per_s: 1.5,
         ..Calibration::default()
     };
-    let side = (f64::from(count) * ROOM_BL2).sqrt();
+    let side = (f64::from(count) * AREA_PER_BOID_BL2).sqrt();
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [side, side, 0.0]));
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(n_threads)
-        .build()
-        .expect("threads");
-    pool.install(|| {
-        let mut boids = Boids::at_random(&params, &calibration, &lens, &tank, 30.0);
-        let mut run = || {
-            let start = Instant::now();
-            (0..steps).for_each(|_| boids.advance());
-            start.elapsed().as_secs_f64() / f64::from(steps)
-        };
-        (0..3).map(|_| run()).fold(f64::INFINITY, f64::min)
+    timing::on_threads(n_threads, || {
+        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
+        let seconds = timing::fastest_s(3, || (0..steps).for_each(|_| boids.advance()));
+        seconds / f64::from(steps)
     })
 }

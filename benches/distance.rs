@@ -9,6 +9,9 @@
     reason = "the bare instruction is timed by inline assembly"
 )]
 
+mod poses;
+mod timing;
+
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -18,16 +21,13 @@ use flockreel::analysis::distance::{ComparedSprites, DistanceMatrix, Distances, 
 use flockreel::analysis::params::Planes;
 use flockreel::cpu::Level;
 use flockreel::formats::npy;
-use flockreel::library::{Pose, Poses, Sprites, View};
+use flockreel::library::{Pose, Poses, Sprites};
 use flockreel::progress::Silent;
 use flockreel::random;
 use flockreel::scratch::{Full, InMemory};
 
 fn main() {
-    let arguments: Vec<String> = std::env::args()
-        .skip(1)
-        .filter(|a| a != "--bench")
-        .collect();
+    let arguments: Vec<String> = timing::arguments().collect();
     let [path, width, height, clip_frames, out] = &arguments[..] else {
         // `cargo test --benches` runs this program without arguments.
         return println!("arguments: SPRITES WIDTH HEIGHT CLIP_FRAMES OUT_DIR");
@@ -42,7 +42,8 @@ fn main() {
     let one = time(&pixels, clip_frames, 1);
     let all = time(&pixels, clip_frames, n_threads);
     for (name, f) in [("d.npy", 1), ("D.npy", clip_frames)] {
-        let matrix = DistanceMatrix::of(&distances(&pixels, f), &Silent).expect("not cancelled");
+        let matrix =
+            DistanceMatrix::compute(&distances(&pixels, f), &Silent).expect("not cancelled");
         let mut file = std::fs::File::create(Path::new(out).join(name)).expect("a file");
         npy::write(&matrix, &mut file).expect("room for the matrix");
     }
@@ -68,22 +69,12 @@ fn read(path: &Path, [width, height]: [u32; 2]) -> (Sprites, Poses) {
         Ok::<_, Full>(true)
     });
     let sprites = sprites.expect("memory has room");
-    (sprites, still([width, height], n_frames))
+    (sprites, unmeasured(n_frames))
 }
 
 /// Returns poses without any measurement.
-fn still(image_size_px: [u32; 2], n_frames: usize) -> Poses {
-    Poses {
-        tail_beat: None,
-        fps: 30.0,
-        image_size_px,
-        view: View::Side,
-        view_confidence: None,
-        other_movers: Vec::new(),
-        camera: None,
-        animal: None,
-        frames: vec![Pose::default(); n_frames],
-    }
+fn unmeasured(n_frames: usize) -> Poses {
+    poses::from_the_side(vec![Pose::default(); n_frames])
 }
 
 fn distances(pixels: &ComparedSprites, clip_frames: usize) -> Distances<'_> {
@@ -110,27 +101,25 @@ fn share_of_peak(clip_frames: usize) -> [f64; 3] {
         Ok::<_, Full>(true)
     });
     let sprites = sprites.expect("memory has room");
-    let poses = still(size, n_frames);
+    let poses = unmeasured(n_frames);
     let pixels = ComparedSprites::new(&sprites, &poses, Planes::Rgba).expect("memory has room");
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let pool = pool.expect("a thread can be made");
     let n = n_frames as f64;
     let pair_bytes = n * (n + 1.0) / 2.0 * pixels.n_bytes() as f64;
-    let turn = |_| {
-        let look = |_: usize, row: &[u64]| {
+    let measure = |_| {
+        let ignore = |_: usize, row: &[u64]| {
             std::hint::black_box(row);
         };
-        let all = || distances(&pixels, clip_frames).for_each_row(&Silent, look);
         let before = peak_gb_per_s();
         let start = Instant::now();
-        pool.install(all).expect("not cancelled");
+        let result = distances(&pixels, clip_frames).for_each_row(&Silent, ignore);
+        result.expect("not cancelled");
         let busy = pair_bytes / start.elapsed().as_secs_f64() / 1e9;
         let peak = (before + peak_gb_per_s()) / 2.0;
         [busy, peak, busy / peak]
     };
-    let turns: Vec<[f64; 3]> = (0..15).map(turn).collect();
+    let runs: Vec<[f64; 3]> = timing::on_threads(1, || (0..15).map(measure).collect());
     std::array::from_fn(|k| {
-        let mut each: Vec<f64> = turns.iter().map(|turn| turn[k]).collect();
+        let mut each: Vec<f64> = runs.iter().map(|run| run[k]).collect();
         each.sort_by(f64::total_cmp);
         each[each.len() / 2]
     })
@@ -138,20 +127,14 @@ fn share_of_peak(clip_frames: usize) -> [f64; 3] {
 
 /// Returns the fastest of fifteen runs, seconds.
 fn time(pixels: &ComparedSprites, clip_frames: usize, n_threads: usize) -> f64 {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(n_threads)
-        .build();
-    let pool = pool.expect("threads can be made");
     let run = || {
-        let start = Instant::now();
         let mut total = 0u64;
-        let mut add = |_, row: &[u64]| total = total.wrapping_add(row.iter().sum());
-        pool.install(|| distances(pixels, clip_frames).for_each_row(&Silent, &mut add))
-            .expect("not cancelled");
+        let add = |_: usize, row: &[u64]| total = total.wrapping_add(row.iter().sum());
+        let result = distances(pixels, clip_frames).for_each_row(&Silent, add);
+        result.expect("not cancelled");
         std::hint::black_box(total);
-        start.elapsed().as_secs_f64()
     };
-    (0..15).map(|_| run()).fold(f64::INFINITY, f64::min)
+    timing::on_threads(n_threads, || timing::fastest_s(15, run))
 }
 
 /// Returns the peak throughput of psadbw followed by its addition, from registers only, GB/s.

@@ -6,9 +6,11 @@
 //! frames, half of them mirrored. The boids are simulated once. Only the planning is timed, on one thread and
 //! on all. Prints one line of JSON.
 
+mod poses;
+mod timing;
+
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use flockreel::cpu::Level;
 use flockreel::flock::lens::Lens;
@@ -16,7 +18,7 @@ use flockreel::flock::motion::motion_of;
 use flockreel::flock::plan::{Model, Planner};
 use flockreel::flock::{BoidTrack, Params, Stats, plan_flock};
 use flockreel::formats::library_dir;
-use flockreel::library::{Jump, Library, LibraryStats, Playback, Pose, Poses, Sprites, View};
+use flockreel::library::{Jump, Library, LibraryStats, Playback, Pose, Sprites};
 use flockreel::progress::Silent;
 use flockreel::random::uniform;
 use flockreel::raster::RgbImage;
@@ -24,7 +26,7 @@ use flockreel::scratch::InMemory;
 
 fn main() {
     let (flags, arguments): (Vec<String>, Vec<String>) =
-        std::env::args().skip(1).partition(|a| a.starts_with("--"));
+        timing::arguments().partition(|a| a.starts_with("--"));
     let n_frames = flags.iter().find_map(|flag| flag.strip_prefix("--of="));
     let n_frames = n_frames.map_or(1200, |n| n.parse().expect("a number"));
     let mirror = !flags.iter().any(|flag| flag == "--one-side");
@@ -39,7 +41,7 @@ fn main() {
                 .expect("a library")
                 .library
         }
-        None => made_library(n_frames),
+        None => synthetic_library(n_frames),
     };
     let params = Params {
         count: Some(number(count)),
@@ -76,30 +78,20 @@ fn time(
     n_threads: usize,
     n_runs: u32,
 ) -> f64 {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(n_threads)
-        .build()
-        .expect("threads");
     let motion = motion_of(library, &Lens::of(library, params));
     let run = || {
-        let start = Instant::now();
-        let plans = pool.install(|| {
-            let model = Model::new(library, &motion, params);
-            Planner::new(&model, boids).plan(&Silent)
-        });
+        let model = Model::new(library, &motion, params);
+        let plans = Planner::new(&model, boids).plan(&Silent);
         std::hint::black_box(plans.expect("plans"));
-        start.elapsed().as_secs_f64()
     };
-    (0..n_runs.max(1))
-        .map(|_| run())
-        .fold(f64::INFINITY, f64::min)
+    timing::on_threads(n_threads, || timing::fastest_s(n_runs.max(1), run))
 }
 
 const LENGTH_PX: f64 = 80.0;
 const EPSILON: u64 = 1000;
 
 /// Returns a library of an animal that swims to and fro and can jump between moments of similar heading.
-fn made_library(n_frames: u32) -> Library {
+fn synthetic_library(n_frames: u32) -> Library {
     let wave = |frame: u32, period: f64| (f64::from(frame) / period).sin();
     let heading = |frame: u32| {
         let side = if wave(frame, 29.0) > 0.0 {
@@ -124,19 +116,9 @@ fn made_library(n_frames: u32) -> Library {
             }
         })
         .collect();
-    let jumps = made_jumps(n_frames, heading);
+    let jumps = synthetic_jumps(n_frames, heading);
     Library {
-        poses: Poses {
-            tail_beat: None,
-            fps: 30.0,
-            image_size_px: [640, 480],
-            view: View::Side,
-            view_confidence: None,
-            other_movers: Vec::new(),
-            camera: None,
-            animal: None,
-            frames,
-        },
+        poses: poses::from_the_side(frames),
         background: RgbImage::new(640, 480),
         occluders: None,
         sprites: Sprites::missing(96, 64, n_frames as usize),
@@ -162,17 +144,18 @@ fn made_library(n_frames: u32) -> Library {
     }
 }
 
-fn made_jumps(n_frames: u32, heading: impl Fn(u32) -> f64) -> Vec<Jump> {
-    let frame = |draw: u64, which: u64| (uniform(5, &[which, draw]) * f64::from(n_frames)) as u32;
+fn synthetic_jumps(n_frames: u32, heading: impl Fn(u32) -> f64) -> Vec<Jump> {
+    let frame = |draw: u64, which: u64| (unit(5, &[which, draw]) * f64::from(n_frames)) as u32;
     let jump = |draw: u64| {
         let (from, to) = (frame(draw, 1), frame(draw, 2));
-        let mirrored = uniform(5, &[3, draw]) < 0.5;
-        let meant = match mirrored {
-            true => std::f64::consts::PI - heading(to),
-            false => heading(to),
+        let mirrored = unit(5, &[3, draw]) < 0.5;
+        let shown = if mirrored {
+            std::f64::consts::PI - heading(to)
+        } else {
+            heading(to)
         };
-        let alike = (heading(from) - meant).cos() > 0.97 && from.abs_diff(to) > 15;
-        let cost = 500 + (uniform(5, &[4, draw]) * 499.0) as u64;
+        let alike = (heading(from) - shown).cos() > 0.97 && from.abs_diff(to) > 15;
+        let cost = 500 + (unit(5, &[4, draw]) * 499.0) as u64;
         alike.then_some(Jump {
             from,
             to,

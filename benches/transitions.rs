@@ -5,6 +5,9 @@
 //! for the transitions below its epsilon, on one thread and on all. With `N`, draws N sprites
 //! and times the whole search. Prints one line of JSON.
 
+mod poses;
+mod timing;
+
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
@@ -14,15 +17,14 @@ use flockreel::analysis::distance::{ComparedSprites, Distances, Side};
 use flockreel::analysis::{Params, transition};
 use flockreel::cpu::Level;
 use flockreel::formats::library_dir;
-use flockreel::library::{Library, Pose, Poses, Sprites, View};
+use flockreel::library::{Library, Pose, Poses, Sprites};
 use flockreel::progress::Silent;
 use flockreel::random;
 use flockreel::scratch::{Full, InMemory};
 use flockreel::store::Spill;
 
 fn main() {
-    let mut arguments = std::env::args().skip(1).filter(|a| a != "--bench");
-    match arguments.next() {
+    match timing::arguments().next() {
         None => println!("arguments: LIBRARY_DIR, or a number of frames"),
         Some(argument) => match argument.parse() {
             Ok(n_frames) => from_end_to_end(n_frames),
@@ -37,7 +39,7 @@ fn pruned_against_all(folder: &Path) {
     let pixels = ComparedSprites::new(&library.sprites, &library.poses, params.planes);
     let pixels = pixels.expect("memory has room");
     let threads = rayon::current_num_threads();
-    let found = [1, threads].map(|n_threads| times(&library, &params, &pixels, n_threads));
+    let found = [1, threads].map(|n| timing::on_threads(n, || times(&library, &params, &pixels)));
     let [one, all] = &found;
     let side = |k: usize| {
         format!(
@@ -74,19 +76,7 @@ struct Times {
 }
 
 /// Returns the fastest of seven runs each.
-fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads: usize) -> Times {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(n_threads)
-        .build();
-    let pool = pool.expect("threads can be made");
-    let best = |run: &mut dyn FnMut()| {
-        let seconds = |_| {
-            let start = Instant::now();
-            run();
-            start.elapsed().as_secs_f64()
-        };
-        (0..7).map(seconds).fold(f64::INFINITY, f64::min)
-    };
+fn times(library: &Library, params: &Params, pixels: &ComparedSprites) -> Times {
     let mut times = Times::default();
     for (k, sides) in [&[Side::Plain][..], &[Side::Plain, Side::Mirrored]]
         .into_iter()
@@ -98,13 +88,13 @@ fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads
             side,
             cpu: Level::detect(),
         };
-        times.all_s[k] = best(&mut || {
+        times.all_s[k] = timing::fastest_s(7, || {
             for &side in sides {
-                let look = |_: usize, row: &[u64]| {
+                let ignore = |_: usize, row: &[u64]| {
                     black_box(row);
                 };
-                let all = || distances(side).for_each_row(&Silent, look);
-                pool.install(all).expect("nobody cancels");
+                let result = distances(side).for_each_row(&Silent, ignore);
+                result.expect("nobody cancels");
             }
         });
         // With a fixed epsilon, one search runs, whatever kappa the library used.
@@ -113,11 +103,10 @@ fn times(library: &Library, params: &Params, pixels: &ComparedSprites, n_threads
             mirror: k == 1,
             ..params.clone()
         };
-        let of = (&library.sprites, &library.poses);
-        times.search_s[k] = best(&mut || {
-            let search =
-                || transition::connect_compared(pixels, of, &params, Level::detect(), &Silent);
-            let found = pool.install(search).expect("nobody cancels");
+        times.search_s[k] = timing::fastest_s(7, || {
+            let (sprites, poses, cpu) = (&library.sprites, &library.poses, Level::detect());
+            let found = transition::connect_compared(pixels, sprites, poses, &params, cpu, &Silent);
+            let found = found.expect("nobody cancels");
             times.n_candidates = found.n_candidates;
             times.n_transitions = found.transitions.len();
         });
@@ -188,17 +177,7 @@ impl Swim {
             heading_rad: Some(libm::atan2(libm::sin(pitch), libm::cos(yaw))),
             ..Pose::default()
         };
-        Poses {
-            tail_beat: None,
-            fps: 30.0,
-            image_size_px: [640, 480],
-            view: View::Side,
-            view_confidence: None,
-            other_movers: Vec::new(),
-            camera: None,
-            animal: None,
-            frames: self.moments.iter().map(pose).collect(),
-        }
+        poses::from_the_side(self.moments.iter().map(pose).collect())
     }
 
     /// Draws an orange spindle with a dark eye, foreshortened by the yaw, with a bent tail and a little

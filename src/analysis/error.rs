@@ -112,17 +112,17 @@ pub struct Evidence {
 impl Error {
     /// Returns the evidence at a frame rate of `fps`, or `None` if no frame shows the reason.
     pub fn evidence(&self, fps: f64) -> Option<Evidence> {
-        let at = |at_s: f64| (at_s * fps).round() as usize;
+        let frame_at = |at_s: f64| (at_s * fps).round() as usize;
         let (frames, boxes_px) = match *self {
             Error::BackgroundNotStatic {
                 at_s,
                 box_px: Some(box_px),
-            } => (vec![at(at_s)], vec![box_px]),
+            } => (vec![frame_at(at_s)], vec![box_px]),
             Error::BackgroundNotStatic { at_s, box_px: None }
             | Error::CameraMoves { at_s }
             | Error::LightChanges { at_s }
             | Error::SceneChanges { at_s } => {
-                let mut frames = vec![at(at_s / 2.0), at(at_s)];
+                let mut frames = vec![frame_at(at_s / 2.0), frame_at(at_s)];
                 frames.dedup();
                 (frames, Vec::new())
             }
@@ -133,9 +133,9 @@ impl Error {
         Some(Evidence { frames, boxes_px })
     }
 
-    /// Returns the error with its frame number counted from the start of the footage, if the part that was analyzed starts at
-    /// frame `first`.
-    pub(super) fn after(mut self, first: usize) -> Error {
+    /// Returns the error with its frame number counted from the start of the footage. The analyzed part starts
+    /// at frame `first`.
+    pub(super) fn with_frame_offset(mut self, first: usize) -> Error {
         match &mut self {
             Error::NothingAtPoint(at) => at.frame += first as u32,
             Error::AnimalTooLarge { frame, .. } | Error::SeveralAnimals { frame, .. } => {

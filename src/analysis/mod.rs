@@ -14,27 +14,21 @@ pub mod subject;
 
 // Tracking and cutting out the animal.
 pub mod matte;
-pub mod moments;
 pub mod occluders;
 pub mod read_ahead;
 pub mod shadow;
-pub mod sprite;
 pub mod track;
 
-// The pose of the animal.
-pub mod direction;
-pub mod midline;
+// The pose of the animal, and similar moments.
 pub mod pose;
-
-// Similar moments.
-pub mod distance;
-pub mod playback;
+pub mod similarity;
 pub mod stats;
-pub mod transition;
 
 pub use error::{Error, Evidence};
 pub use params::Params;
 use params::{CutSprites, ScaleMode};
+use pose::{midline, sprite};
+use similarity::transition;
 
 use std::sync::Arc;
 
@@ -46,7 +40,7 @@ use crate::raster::RgbImage;
 use crate::scratch::Scratch;
 
 /// Minimum number of frames in a footage. Free choice.
-pub const LEAST_FRAMES: usize = 16;
+pub const MIN_FRAMES: usize = 16;
 
 /// Analyses a footage and returns its library: background, poses, sprites, transitions.
 ///
@@ -69,9 +63,9 @@ pub fn analyze(
 ) -> Result<Library, Error> {
     let part = Part::new(source, params.from_s, params.to_s);
     let first = part.first_frame();
-    let inner = params.counted_from(first);
-    let mut library = analyze_part(&part, background, &inner, cpu, scratch, progress)
-        .map_err(|error| error.after(first))?;
+    let params_of_part = params.counted_from(first);
+    let mut library = analyze_part(&part, background, &params_of_part, cpu, scratch, progress)
+        .map_err(|error| error.with_frame_offset(first))?;
     if params.from_s.is_some() || params.to_s.is_some() {
         library.place_in_footage(first, source.format().n_frames_hint);
     }
@@ -93,15 +87,12 @@ fn analyze_part(
         let track = track::follow(batches, n_frames, &scene, params, scratch, progress)?;
         Ok::<_, Error>((scene, track))
     })?;
-    let lights: Vec<usize> = scene
-        .backgrounds
-        .iter()
-        .map(|background| background.light)
-        .collect();
-    let background = scene.backgrounds.swap_remove(0);
-    let occluders = match scene.is_masked {
-        true => None,
-        false => occluders::remove(&mut track, &background, progress)?,
+    let lights: Vec<usize> = scene.plates.iter().map(|plate| plate.light).collect();
+    let plate = scene.plates.swap_remove(0);
+    let occluders = if scene.is_masked {
+        None
+    } else {
+        occluders::take_out(&mut track, &plate, progress)?
     };
     let (view, view_confidence) = pose::view(&track.frames, params);
     let animal_too_small =
@@ -111,31 +102,29 @@ fn analyze_part(
     poses.other_movers = std::mem::take(&mut track.movers);
     midline::trace(&mut poses, &track);
     poses.tail_beat = midline::tail_beat::measure(&poses);
-    let sprites = match animal_too_small {
-        true => sprite::none(track.frames.len()),
-        false => {
-            let by_depth = params.scale_mode == ScaleMode::Depth && view == View::Side;
-            let scales = by_depth.then(|| sprite::scales(&poses));
-            let is_in_light = |background_idx: usize| lights[background_idx] == lights[0];
-            sprite::align(&track, view, scales, is_in_light)
-        }
+    let sprites = if animal_too_small {
+        sprite::missing(track.frames.len())
+    } else {
+        let by_depth = params.scale_mode == ScaleMode::Depth && view == View::Side;
+        let scales = by_depth.then(|| sprite::scales(&poses));
+        let is_in_light = |plate_idx: usize| lights[plate_idx] == lights[0];
+        sprite::align(&track, view, scales, is_in_light)
     };
     let length_px = (view == View::Top)
         .then(|| stats::length_px(&poses))
         .flatten();
-    let shadow = length_px.and_then(|px| shadow::measure(&track, &background.rgb, px));
-    let foreign = || track.frames.iter().filter(|t| t.background_idx.is_none());
-    let n_foreign_frames = foreign().count();
-    let first_foreign_s = foreign().next().map(|t| t.time_s);
+    let shadow = length_px.and_then(|px| shadow::measure(&track, &plate.rgb, px));
+    let foreign = track.frames.iter().filter(|t| t.plate_idx.is_none());
+    let foreign_times_s: Vec<f64> = foreign.map(|t| t.time_s).collect();
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
     let stats = LibraryStats {
         never_seen_px: background.never_seen_px,
         several_animals: scene.several_animals,
-        n_foreign_frames,
-        first_foreign_s,
+        n_foreign_frames: foreign_times_s.len(),
+        first_foreign_s: foreign_times_s.first().copied(),
         animal_too_small,
-        ..stats::of(&poses, &connections)
+        ..stats::library_stats(&poses, &connections)
     };
     Ok(Library {
         poses,

@@ -11,30 +11,30 @@ use crate::footage::{FrameSource, SourceError};
 use crate::raster::Frame;
 
 /// Approximate size of the queue, bytes. It holds at least two batches. Free choice.
-const RING_BYTES: usize = 128 << 20;
+const QUEUE_BYTES: usize = 128 << 20;
 /// Approximate size of a batch, bytes. Free choice.
 const BATCH_BYTES: usize = 4 << 20;
 /// Largest number of frames in a batch. Free choice.
-const BATCH_FRAMES: usize = 16;
+const MAX_BATCH_FRAMES: usize = 16;
 
 /// The true time of a frame, seconds from the first frame, and the frame.
-pub type Timed = (f64, Frame);
+pub type TimedFrame = (f64, Frame);
 
 /// The frames of a footage in batches.
 pub struct Batches {
-    ready: Receiver<Result<Vec<Timed>, SourceError>>,
-    used: Sender<Vec<Timed>>,
+    ready: Receiver<Result<Vec<TimedFrame>, SourceError>>,
+    used: Sender<Vec<TimedFrame>>,
 }
 
 impl Batches {
     /// Returns the next batch, in order and not empty; `None` after the last.
-    pub fn next_batch(&self) -> Result<Option<Vec<Timed>>, SourceError> {
+    pub fn next_batch(&self) -> Result<Option<Vec<TimedFrame>>, SourceError> {
         // A closed channel means that the reader has finished.
         self.ready.recv().ok().transpose()
     }
 
     /// Returns the memory of a batch to the reader.
-    pub fn give_back(&self, batch: Vec<Timed>) {
+    pub fn recycle(&self, batch: Vec<TimedFrame>) {
         // A finished reader needs no memory, so a failure is ignored.
         self.used.send(batch).ok();
     }
@@ -44,8 +44,8 @@ impl Batches {
 pub fn while_reading<R>(source: &dyn FrameSource, work: impl FnOnce(Batches) -> R) -> R {
     let format = source.format();
     let n_bytes = Frame::n_bytes(format.width, format.height).max(1);
-    let n_frames = (BATCH_BYTES / n_bytes).clamp(1, BATCH_FRAMES);
-    let n_waiting = (RING_BYTES / (n_bytes * n_frames)).max(2);
+    let n_frames = (BATCH_BYTES / n_bytes).clamp(1, MAX_BATCH_FRAMES);
+    let n_waiting = (QUEUE_BYTES / (n_bytes * n_frames)).max(2);
     let (send, ready) = sync_channel(n_waiting);
     let (used, free) = channel();
     thread::scope(|scope| {
@@ -63,13 +63,13 @@ pub fn while_reading<R>(source: &dyn FrameSource, work: impl FnOnce(Batches) -> 
 fn read(
     source: &dyn FrameSource,
     n_frames: usize,
-    send: &SyncSender<Result<Vec<Timed>, SourceError>>,
-    free: &Receiver<Vec<Timed>>,
+    send: &SyncSender<Result<Vec<TimedFrame>, SourceError>>,
+    free: &Receiver<Vec<TimedFrame>>,
 ) -> Result<(), SourceError> {
     let mut stream = source.open()?;
     loop {
         let mut batch = free.try_recv().unwrap_or_default();
-        batch.resize_with(n_frames, Timed::default);
+        batch.resize_with(n_frames, TimedFrame::default);
         let mut n_read = 0;
         for (time_s, frame) in &mut batch {
             match stream.next_frame(frame)? {
@@ -94,14 +94,14 @@ mod tests {
     use crate::raster::ColorSpec;
 
     /// Frames that contain their own number, followed by a failure if `fails` is set.
-    struct Numbers {
+    struct NumberedFrames {
         n_frames: u8,
         fails: bool,
     }
 
-    struct Counting<'a>(&'a Numbers, u8);
+    struct NumberedStream<'a>(&'a NumberedFrames, u8);
 
-    impl FrameSource for Numbers {
+    impl FrameSource for NumberedFrames {
         fn format(&self) -> FootageFormat {
             FootageFormat {
                 width: 2,
@@ -113,20 +113,18 @@ mod tests {
         }
 
         fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
-            Ok(Box::new(Counting(self, 0)))
+            Ok(Box::new(NumberedStream(self, 0)))
         }
     }
 
-    impl FrameStream for Counting<'_> {
+    impl FrameStream for NumberedStream<'_> {
         fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
             if self.1 == self.0.n_frames {
-                return match self.0.fails {
-                    true => Err(SourceError {
-                        code: Code::Truncated,
-                        cause: "cut off".into(),
-                    }),
-                    false => Ok(None),
+                let error = SourceError {
+                    code: Code::Truncated,
+                    cause: "cut off".into(),
                 };
+                return if self.0.fails { Err(error) } else { Ok(None) };
             }
             frame.planes = vec![self.1; 6];
             self.1 += 1;
@@ -135,13 +133,13 @@ mod tests {
     }
 
     fn numbers(n_frames: u8, fails: bool) -> (Vec<u8>, bool) {
-        while_reading(&Numbers { n_frames, fails }, |batches| {
+        while_reading(&NumberedFrames { n_frames, fails }, |batches| {
             let mut seen = Vec::new();
             loop {
                 match batches.next_batch() {
                     Ok(Some(batch)) => {
                         seen.extend(batch.iter().map(|(_, frame)| frame.planes[0]));
-                        batches.give_back(batch);
+                        batches.recycle(batch);
                     }
                     Ok(None) => return (seen, false),
                     Err(_) => return (seen, true),
@@ -158,13 +156,13 @@ mod tests {
     }
 
     #[test]
-    fn a_failure_comes_after_the_whole_batches_before_it() {
+    fn a_failure_follows_all_complete_batches() {
         assert_eq!(numbers(40, true), ((0..32).collect(), true));
     }
 
     #[test]
-    fn a_reader_that_nobody_listens_to_ends() {
-        let source = Numbers {
+    fn the_reader_ends_when_the_consumer_stops() {
+        let source = NumberedFrames {
             n_frames: 250,
             fails: false,
         };

@@ -6,7 +6,9 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Error, Listener, Summary};
-use crate::analysis::distance::{Cancelled, ComparedSprites, DistanceMatrix, Distances, Side};
+use crate::analysis::similarity::distance::{
+    Cancelled, ComparedSprites, DistanceMatrix, Distances, Side,
+};
 use crate::code::Code;
 use crate::cpu::Level;
 use crate::formats::distance_map::DistanceMap;
@@ -93,7 +95,7 @@ impl Format {
 
 fn write_numbers(distances: &Distances<'_>, path: &Path) -> Result<(), Error> {
     npy::check(distances.pixels.n_frames()).map_err(|error| Error::work(error.code(), &error))?;
-    let matrix = DistanceMatrix::of(distances, &Listener::new()).map_err(cancelled)?;
+    let matrix = DistanceMatrix::compute(distances, &Listener::new()).map_err(cancelled)?;
     let write = || {
         let mut file = BufWriter::new(File::create(path)?);
         npy::write(&matrix, &mut file)?;

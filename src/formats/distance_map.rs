@@ -10,7 +10,7 @@
 //! shows the minimum of its pairs, so that a single similar pair stays visible.
 
 use super::picture;
-use crate::analysis::distance::{Cancelled, ClipPair, Distances, Everything};
+use crate::analysis::similarity::distance::{AllPairs, Cancelled, ClipPair, Distances};
 use crate::library::{Library, Sprites};
 use crate::progress::Progress;
 
@@ -63,7 +63,12 @@ impl DistanceMap {
             distances.for_each_row(progress, |from, row| {
                 let pair = |(to, &distance)| ClipPair { from, to, distance };
                 (from..).zip(row).map(pair).for_each(&mut pool);
-            })?
+            })?,
+            true => {
+                let limit = library.epsilon.saturating_mul(FAR);
+                let near = |_: usize, pairs: &[ClipPair]| pairs.iter().copied().for_each(&mut pool);
+                distances.for_each_row_below(limit, &AllPairs, progress, near)?
+            }
         }
         map.mirror_triangle();
         Ok(map)
@@ -189,8 +194,8 @@ mod tests {
     use std::sync::Arc;
 
     use crate::analysis::Params;
-    use crate::analysis::distance::{ComparedSprites, Side};
     use crate::analysis::params::Planes;
+    use crate::analysis::similarity::distance::{ComparedSprites, Side};
     use crate::cpu::Level;
     use crate::flock::synthetic;
     use crate::library::{Transition, View};

@@ -6,7 +6,7 @@
 
 use std::io::{self, Write};
 
-use crate::analysis::distance::DistanceMatrix;
+use crate::analysis::similarity::distance::DistanceMatrix;
 use crate::code::Code;
 
 /// Maximum number of frames. Longer footage is refused, because its matrix would exceed 256 MB.
@@ -76,7 +76,7 @@ fn header(kind: &str, n: usize) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::distance::tests::matrix_of_gray_levels;
+    use crate::analysis::similarity::distance::tests::matrix_of_gray_levels;
 
     #[test]
     fn bytes_are_those_of_numpy() {
@@ -102,8 +102,8 @@ mod tests {
     }
 
     #[test]
-    fn distances_above_32_bits_are_written_in_64() {
-        let matrix = DistanceMatrix::of_triangle(2, vec![0, 1 << 40, 0]);
+    fn distances_beyond_32_bits_are_written_in_64() {
+        let matrix = DistanceMatrix::from_triangle(2, vec![0, 1 << 40, 0]);
         let mut bytes = Vec::new();
         write(&matrix, &mut bytes).expect("memory takes all");
         assert!(matrix.max() > u64::from(u32::MAX));

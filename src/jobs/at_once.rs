@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{Context, Error};
-use crate::analysis::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
+use crate::analysis::similarity::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
 use crate::cpu::Level;
 use crate::flock::{Params, plan_flock};
 use crate::formats::library_dir::{self, StoredLibrary};
@@ -40,7 +40,7 @@ pub async fn distances(context: &Context, library: &Library) -> Result<File, Err
             side: Side::Plain,
             cpu: Level::detect(),
         };
-        let matrix = DistanceMatrix::of(&distances, waiting);
+        let matrix = DistanceMatrix::compute(&distances, waiting);
         let Ok(matrix) = matrix else {
             return Err(Error::Cancelled);
         };

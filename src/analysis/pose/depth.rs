@@ -10,11 +10,10 @@ use crate::analysis::params::Eq7;
 use crate::geometry::Camera;
 use crate::library::{Animal, Poses, RawPose, View};
 
-/// Writes the raw heading of every pose. In side view, with a camera and the animal's size, also the raw
-/// position and direction. From above they are unknown, because the silhouette does not show the height.
-pub fn measure_alone(poses: &mut Poses, params: &Params) {
-    let known = poses.camera.zip(poses.animal);
-    let calibrated = known.filter(|_| poses.view == View::Side);
+/// Writes the raw heading of every pose. With a camera and the animal's size, also the raw position and
+/// direction.
+pub(super) fn measure_raw(poses: &mut Poses, params: &Params) {
+    let calibrated = poses.camera.zip(poses.animal);
     let mut last_depth = None;
     for pose in &mut poses.frames {
         if !pose.detected() {
@@ -27,10 +26,11 @@ pub fn measure_alone(poses: &mut Poses, params: &Params) {
         let sizes = pose.length_px.zip(pose.height_px);
         // A silhouette cut by the border shows only a part of its height.
         let whole = sizes.filter(|&(_, height)| height > 0.0 && !pose.cut);
-        if let (Some((camera, animal)), Some(sizes), Some(centroid)) =
+        if let (Some((camera, animal)), Some((length_px, height_px)), Some(centroid)) =
             (calibrated, whole, pose.centroid_px)
         {
-            let (depth_m, cosine) = depth_and_cosine(&camera, &animal, sizes, params.eq7);
+            let (depth_m, cosine) =
+                depth_and_cosine(&camera, &animal, length_px, height_px, params.eq7);
             raw.position_m = Some(camera.point_in_camera(centroid, depth_m));
             raw.gamma_rad = Some(libm::acos(cosine));
             let toward = last_depth.is_some_and(|last| depth_m < last);
@@ -51,7 +51,8 @@ pub fn measure_alone(poses: &mut Poses, params: &Params) {
 fn depth_and_cosine(
     camera: &Camera,
     animal: &Animal,
-    (length_px, height_px): (f64, f64),
+    length_px: f64,
+    height_px: f64,
     eq7: Eq7,
 ) -> (f64, f64) {
     let depth_m = match eq7 {
@@ -80,11 +81,11 @@ mod tests {
 
     #[test]
     fn a_fish_at_double_distance_is_half_as_tall() {
-        let near = depth_and_cosine(&CAMERA, &ANIMAL, (100.0, 50.0), Eq7::Corrected);
-        let far = depth_and_cosine(&CAMERA, &ANIMAL, (50.0, 25.0), Eq7::Corrected);
+        let near = depth_and_cosine(&CAMERA, &ANIMAL, 100.0, 50.0, Eq7::Corrected);
+        let far = depth_and_cosine(&CAMERA, &ANIMAL, 50.0, 25.0, Eq7::Corrected);
         assert!((near.0 - 0.7).abs() < 1e-12 && (far.0 - 1.4).abs() < 1e-12);
         assert_eq!((near.1, far.1), (1.0, 1.0));
-        let printed = depth_and_cosine(&CAMERA, &ANIMAL, (50.0, 25.0), Eq7::Printed);
+        let printed = depth_and_cosine(&CAMERA, &ANIMAL, 50.0, 25.0, Eq7::Printed);
         assert!(
             (printed.0 - 0.35).abs() < 1e-12,
             "as printed, it comes nearer"
@@ -93,7 +94,7 @@ mod tests {
 
     #[test]
     fn a_fish_seen_at_half_its_length_is_turned_by_sixty_degrees() {
-        let (_, cosine) = depth_and_cosine(&CAMERA, &ANIMAL, (50.0, 50.0), Eq7::Corrected);
+        let (_, cosine) = depth_and_cosine(&CAMERA, &ANIMAL, 50.0, 50.0, Eq7::Corrected);
         assert!((libm::acos(cosine).to_degrees() - 60.0).abs() < 1e-9);
     }
 

@@ -9,43 +9,53 @@
 use super::Axes;
 
 /// Speed along the axis that counts as evidence 1, body lengths per second. Free choice.
-const DECISIVE_SPEED: f64 = 0.45;
+const UNIT_SPEED_BL_S: f64 = 0.45;
 /// Greatest evidence from motion, half the log-odds. Free choice.
-const MOST_MOTION: f64 = 3.0;
+const MAX_MOTION_EVIDENCE: f64 = 3.0;
 /// Evidence where the user gave the head; it exceeds all other evidence.
-const PINNED: f64 = 1e6;
+const GIVEN_HEAD_EVIDENCE: f64 = 1e6;
 
 /// The head in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Head {
+pub(super) struct Head {
     /// Whether the head lies toward +axis, with the axis in (-pi/2, pi/2].
-    pub forward: bool,
+    pub(super) forward: bool,
     /// Posterior probability of the chosen end, 0..=1; below 0.5 where the cheapest sequence contradicts it.
-    pub confidence: f64,
+    pub(super) confidence: f64,
+}
+
+/// The head in one frame, as the user gave it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GivenHead {
+    /// Frame number.
+    pub(super) frame_idx: usize,
+    /// Whether the head lies toward +axis.
+    pub(super) forward: bool,
+}
+
+/// Costs of keeping and of changing the state between two frames.
+#[derive(Clone, Copy, Default)]
+struct SwitchCosts {
+    keep: f64,
+    change: f64,
 }
 
 /// Decides for every frame with an axis; other frames get `None`.
 ///
 /// `speed_along` is the speed toward +axis, body lengths per second. `ends` is the evidence of the ends for
-/// +axis, half the log-odds. `pin` is a frame whose head is known to lie toward +axis (true) or -axis
-/// (false).
-pub fn decode(
+/// +axis, half the log-odds.
+pub(super) fn decode(
     axes: &[Option<Axes>],
     speed_along: &[Option<f64>],
     ends: &[Option<f64>],
-    pin: Option<(usize, bool)>,
+    given_head: Option<GivenHead>,
 ) -> Vec<Option<Head>> {
-    let evidence = evidence(axes, speed_along, ends, pin);
+    let evidence = evidence(axes, speed_along, ends, given_head);
     let seen: Vec<usize> = (0..axes.len()).filter(|&k| evidence[k].is_some()).collect();
     let emissions: Vec<f64> = seen.iter().filter_map(|&k| evidence[k]).collect();
-    let switches: Vec<(f64, f64)> = seen
-        .windows(2)
-        .filter_map(|pair| {
-            Some(switch_costs(
-                axes[pair[0]].as_ref()?,
-                axes[pair[1]].as_ref()?,
-            ))
-        })
+    let seen_axes: Vec<&Axes> = seen.iter().filter_map(|&k| axes[k].as_ref()).collect();
+    let switches: Vec<SwitchCosts> = (seen_axes.windows(2))
+        .map(|pair| switch_costs(pair[0], pair[1]))
         .collect();
     let path = viterbi(&emissions, &switches);
     let posterior = forward_backward(&emissions, &switches);
@@ -62,9 +72,9 @@ pub fn decode(
 /// Decides as Okabe et al., section 3.3, print it: the head turns least from the previous frame.
 ///
 /// In the first frame it lies toward +axis. The rule gives no probability, so the confidence is 0.5.
-pub fn keep(axes: &[Option<Axes>]) -> Vec<Option<Head>> {
+pub(super) fn least_turn(axes: &[Option<Axes>]) -> Vec<Option<Head>> {
     let mut last: Option<[f64; 2]> = None;
-    let mut one = |axes: &Option<Axes>| {
+    let mut head = |axes: &Option<Axes>| {
         let u = axes.as_ref()?.direction()?;
         let forward = last.is_none_or(|v| u[0] * v[0] + u[1] * v[1] >= 0.0);
         last = Some(if forward { u } else { [-u[0], -u[1]] });
@@ -73,7 +83,7 @@ pub fn keep(axes: &[Option<Axes>]) -> Vec<Option<Head>> {
             confidence: 0.5,
         })
     };
-    axes.iter().map(&mut one).collect()
+    axes.iter().map(&mut head).collect()
 }
 
 /// Returns the evidence for the head toward +axis in each frame: minus the emission cost of that state.
@@ -81,66 +91,66 @@ fn evidence(
     axes: &[Option<Axes>],
     speed_along: &[Option<f64>],
     ends: &[Option<f64>],
-    pin: Option<(usize, bool)>,
+    given_head: Option<GivenHead>,
 ) -> Vec<Option<f64>> {
-    let one = |k: usize| {
+    let evidence_at = |k: usize| {
         axes[k].as_ref()?.axis_rad?;
         let speed = speed_along[k].unwrap_or(0.0);
-        let motion = (speed / DECISIVE_SPEED).clamp(-MOST_MOTION, MOST_MOTION);
-        let pinned = match pin {
-            Some((frame, forward)) if frame == k => {
-                if forward {
-                    PINNED
-                } else {
-                    -PINNED
-                }
-            }
-            _ => 0.0,
+        let motion = (speed / UNIT_SPEED_BL_S).clamp(-MAX_MOTION_EVIDENCE, MAX_MOTION_EVIDENCE);
+        let given = match given_head.filter(|head| head.frame_idx == k) {
+            Some(head) if head.forward => GIVEN_HEAD_EVIDENCE,
+            Some(_) => -GIVEN_HEAD_EVIDENCE,
+            None => 0.0,
         };
-        Some(motion + ends[k].unwrap_or(0.0) + pinned)
+        Some(motion + ends[k].unwrap_or(0.0) + given)
     };
-    (0..axes.len()).map(one).collect()
+    (0..axes.len()).map(evidence_at).collect()
 }
 
 /// Returns the speed along +axis in each frame, body lengths per second.
-pub fn speed_along(
+pub(super) fn speed_along(
     axes: &[Option<Axes>],
     velocity_px: &[Option<[f64; 2]>],
     length_px: f64,
 ) -> Vec<Option<f64>> {
-    let of = |(axes, velocity): (&Option<Axes>, &Option<[f64; 2]>)| {
+    let speed = |(axes, velocity): (&Option<Axes>, &Option<[f64; 2]>)| {
         let (u, v) = (axes.as_ref()?.direction()?, (*velocity)?);
         Some((v[0] * u[0] + v[1] * u[1]) / length_px)
     };
-    axes.iter().zip(velocity_px).map(of).collect()
+    axes.iter().zip(velocity_px).map(speed).collect()
 }
 
 /// Returns the costs of keeping and of changing the state between two axes.
-fn switch_costs(a: &Axes, b: &Axes) -> (f64, f64) {
+fn switch_costs(a: &Axes, b: &Axes) -> SwitchCosts {
     let (Some(u), Some(v)) = (a.direction(), b.direction()) else {
-        return (0.0, 0.0);
+        return SwitchCosts::default();
     };
     let cost = 2.0 + 10.0 * (b.length_px / (2.5 * b.height_px.max(1.0))).clamp(0.0, 1.0);
     // The axis itself may flip across the vertical; then the head turns when the state is kept.
-    if u[0] * v[0] + u[1] * v[1] >= 0.0 {
+    let (keep, change) = if u[0] * v[0] + u[1] * v[1] >= 0.0 {
         (0.0, cost)
     } else {
         (cost, 0.0)
-    }
+    };
+    SwitchCosts { keep, change }
 }
 
 /// Returns the cheapest sequence: true where the head lies toward +axis.
-fn viterbi(emissions: &[f64], switches: &[(f64, f64)]) -> Vec<bool> {
+fn viterbi(emissions: &[f64], switches: &[SwitchCosts]) -> Vec<bool> {
     let mut costs = [0.0f64; 2];
     let mut came_from: Vec<[usize; 2]> = Vec::with_capacity(emissions.len());
     for (k, &evidence) in emissions.iter().enumerate() {
-        let (keep, change) = if k == 0 { (0.0, 0.0) } else { switches[k - 1] };
+        let switch = if k == 0 {
+            SwitchCosts::default()
+        } else {
+            switches[k - 1]
+        };
         let mut next = [0.0; 2];
         let mut from = [0; 2];
         for state in 0..2 {
-            let (stay, swap) = (costs[state] + keep, costs[1 - state] + change);
-            from[state] = if stay <= swap { state } else { 1 - state };
-            next[state] = stay.min(swap) + if state == 1 { -evidence } else { evidence };
+            let (kept, changed) = (costs[state] + switch.keep, costs[1 - state] + switch.change);
+            from[state] = if kept <= changed { state } else { 1 - state };
+            next[state] = kept.min(changed) + if state == 1 { -evidence } else { evidence };
         }
         costs = next;
         came_from.push(from);
@@ -155,15 +165,15 @@ fn viterbi(emissions: &[f64], switches: &[(f64, f64)]) -> Vec<bool> {
 }
 
 /// Returns the posterior probability of the head toward +axis in each frame. Costs are negative logarithms.
-fn forward_backward(emissions: &[f64], switches: &[(f64, f64)]) -> Vec<f64> {
+fn forward_backward(emissions: &[f64], switches: &[SwitchCosts]) -> Vec<f64> {
     let n = emissions.len();
     let log_sum = |a: f64, b: f64| a.max(b) + libm::log1p(libm::exp(-(a - b).abs()));
-    let pass = |order: &mut dyn Iterator<Item = usize>, switch: &dyn Fn(usize) -> (f64, f64)| {
+    let pass = |order: &mut dyn Iterator<Item = usize>, switch: &dyn Fn(usize) -> SwitchCosts| {
         let mut messages = vec![[0.0f64; 2]; n];
         let mut last = [0.0f64; 2];
         for (step, k) in order.enumerate() {
             if step > 0 {
-                let (keep, change) = switch(k);
+                let SwitchCosts { keep, change } = switch(k);
                 last = [0, 1].map(|s: usize| log_sum(last[s] - keep, last[1 - s] - change));
                 // Only the difference of the two states matters.
                 last = [last[0] - last[1], 0.0];
@@ -190,8 +200,11 @@ mod tests {
 
     use super::*;
 
-    /// Headings, axes and velocities.
-    type Circling = (Vec<f64>, Vec<Option<Axes>>, Vec<Option<[f64; 2]>>);
+    struct Circling {
+        headings: Vec<f64>,
+        axes: Vec<Option<Axes>>,
+        velocity: Vec<Option<[f64; 2]>>,
+    }
 
     /// An animal that swims in a circle, 60 px long, described by its axis only.
     fn circling(n: usize, speed_px_s: impl Fn(usize) -> f64) -> Circling {
@@ -227,17 +240,21 @@ mod tests {
                 ])
             })
             .collect();
-        (headings, axes, velocity)
+        Circling {
+            headings,
+            axes,
+            velocity,
+        }
     }
 
     /// Decodes from motion only.
     fn decoded(
         axes: &[Option<Axes>],
         velocity: &[Option<[f64; 2]>],
-        pin: Option<(usize, bool)>,
+        given_head: Option<GivenHead>,
     ) -> Vec<Option<Head>> {
         let ends = vec![None; axes.len()];
-        decode(axes, &speed_along(axes, velocity, 60.0), &ends, pin)
+        decode(axes, &speed_along(axes, velocity, 60.0), &ends, given_head)
     }
 
     fn errors(headings: &[f64], axes: &[Option<Axes>], heads: &[Option<Head>]) -> usize {
@@ -254,7 +271,11 @@ mod tests {
 
     #[test]
     fn the_head_is_right_all_round_a_circle() {
-        let (headings, axes, velocity) = circling(400, |_| 60.0);
+        let Circling {
+            headings,
+            axes,
+            velocity,
+        } = circling(400, |_| 60.0);
         let heads = decoded(&axes, &velocity, None);
         assert_eq!(errors(&headings, &axes, &heads), 0);
         assert!(heads.iter().flatten().all(|head| head.confidence > 0.99));
@@ -262,14 +283,17 @@ mod tests {
 
     #[test]
     fn drifting_backward_slowly_does_not_turn_the_head() {
-        let (headings, axes, velocity) =
-            circling(400, |k| if (150..200).contains(&k) { -6.0 } else { 50.0 });
+        let Circling {
+            headings,
+            axes,
+            velocity,
+        } = circling(400, |k| if (150..200).contains(&k) { -6.0 } else { 50.0 });
         let heads = decoded(&axes, &velocity, None);
         assert_eq!(errors(&headings, &axes, &heads), 0);
     }
 
     #[test]
-    fn a_pinned_head_decides_for_an_animal_that_never_moves() {
+    fn a_given_head_decides_for_an_animal_that_never_moves() {
         let axes = vec![
             Some(Axes {
                 axis_rad: Some(0.1),
@@ -281,16 +305,20 @@ mod tests {
         ];
         let velocity = vec![Some([0.0; 2]); 30];
         for forward in [true, false] {
-            let heads = decoded(&axes, &velocity, Some((7, forward)));
+            let given_head = GivenHead {
+                frame_idx: 7,
+                forward,
+            };
+            let heads = decoded(&axes, &velocity, Some(given_head));
             assert!(heads.iter().flatten().all(|head| head.forward == forward));
         }
     }
 
     #[test]
-    fn told_by_the_frame_before_the_first_guess_decides_over_all_frames() {
-        let (headings, axes, _) = circling(400, |_| 0.0);
+    fn with_the_least_turn_the_first_frame_decides_for_all() {
+        let Circling { headings, axes, .. } = circling(400, |_| 0.0);
         for (start, right) in [(0, true), (50, false)] {
-            let heads = keep(&axes[start..]);
+            let heads = least_turn(&axes[start..]);
             for ((head, axes), heading) in heads.iter().zip(&axes[start..]).zip(&headings[start..])
             {
                 let u = axes.as_ref().and_then(Axes::direction).expect("it is long");

@@ -6,28 +6,33 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-pub mod depth;
-mod ends;
-pub mod heading;
+mod appearance;
+mod depth;
+pub mod direction;
+mod heading;
+pub mod midline;
+pub mod moments;
+mod smooth;
+pub mod sprite;
 #[cfg(test)]
-mod painted;
-pub mod smooth;
+mod synthetic;
 mod view;
 
 use super::Params;
-use super::direction::{self, Seen};
 use super::params::AxisAndHead;
 use super::track::Tracked;
 use super::track::sighting::Sighting;
 use crate::footage::FootageFormat;
 use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
-use ends::Ends;
-use smooth::{Smoothed, smooth};
+use appearance::HeadEvidence;
+use direction::Measurement;
+use heading::GivenHead;
+use smooth::smoothed_rates;
 
 /// Least lead of the other axis toward the horizontal for a change of the length axis in side view, radians.
 /// From docs/explanation/algorithms.md, "Corrections to the papers".
-const MEMORY_RAD: f64 = 10.0 * PI / 180.0;
+const SWITCH_LEAD_RAD: f64 = 10.0 * PI / 180.0;
 
 /// Length axis of one frame and measurements along it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,21 +69,18 @@ pub fn view(track: &[Tracked], params: &Params) -> (View, Option<f64>) {
 /// Returns the poses of a track, one per frame.
 pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &Params) -> Poses {
     let axes = length_axes(track, view, params.axis_and_head);
-    let motion = Motion::of(track, format.fps);
-    let reference_px = reference_length_px(&axes);
-    let pin = params.head.and_then(|head| {
-        let frame = head.frame as usize;
-        let direction = axes.get(frame)?.as_ref()?.direction()?;
-        let centroid = track[frame].sighting.as_ref()?.moments.centroid_px;
-        let toward = (head.point[0] - centroid[0]) * direction[0]
-            + (head.point[1] - centroid[1]) * direction[1];
-        Some((frame, toward >= 0.0))
-    });
-    let speed = heading::speed_along(&axes, &motion.velocity_px(), reference_px);
-    let ends = Ends::tell(track, &axes, &speed, format.fps);
+    let given_head = given_head(track, &axes, params);
+    let centroids: Vec<_> = track.iter().map(centroid_px).collect();
+    let velocity_px = velocity_px(&centroids, format.fps);
+    let lengths_px = axes.iter().flatten().map(|axes| axes.length_px);
+    let length_px = reference_length_px(lengths_px).unwrap_or(1.0);
+    let speed_bl_s = heading::speed_along(&axes, &velocity_px, length_px);
+    let appearance = HeadEvidence::estimate(track, &axes, &speed_bl_s, format.fps);
     let heads = match params.axis_and_head {
-        AxisAndHead::Corrected => heading::decode(&axes, &speed, &ends.evidence, pin),
-        AxisAndHead::Printed => heading::keep(&axes),
+        AxisAndHead::Corrected => {
+            heading::decode(&axes, &speed_bl_s, &appearance.half_log_odds, given_head)
+        }
+        AxisAndHead::Printed => heading::least_turn(&axes),
     };
     let mut poses = Poses {
         tail_beat: None,
@@ -89,7 +91,7 @@ pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &P
         other_movers: Vec::new(),
         camera: params.camera(format.width, format.height),
         animal: params.animal(),
-        frames: track.iter().map(seen).collect(),
+        frames: track.iter().map(detection).collect(),
     };
     for ((pose, axes), head) in poses.frames.iter_mut().zip(&axes).zip(&heads) {
         let Some(axes) = axes else { continue };
@@ -106,73 +108,86 @@ pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &P
             }
         });
     }
-    depth::measure_alone(&mut poses, params);
+    depth::measure_raw(&mut poses, params);
     if view == View::Side && params.smooth {
-        best_estimate(&mut poses, track, &axes, &ends, params);
+        let measured = measurements(track, &axes, &appearance, params);
+        set_directions(&mut poses, &measured);
     } else {
-        poses.frames.iter_mut().for_each(take_raw);
+        poses.frames.iter_mut().for_each(use_raw);
     }
-    if pin.is_none() && params.axis_and_head == AxisAndHead::Corrected {
-        for confidence in poses
-            .frames
-            .iter_mut()
-            .filter_map(|pose| pose.head_confidence.as_mut())
-        {
-            *confidence = ends.tempered(*confidence);
+    if given_head.is_none() && params.axis_and_head == AxisAndHead::Corrected {
+        let poses = poses.frames.iter_mut();
+        for confidence in poses.filter_map(|pose| pose.head_confidence.as_mut()) {
+            *confidence = appearance.tempered(*confidence);
         }
     }
     poses
 }
 
+fn centroid_px(tracked: &Tracked) -> Option<[f64; 2]> {
+    let sighting = tracked.sighting.as_ref()?;
+    Some(sighting.moments.centroid_px)
+}
+
+/// Returns the end of the axis at which the user put the head.
+fn given_head(track: &[Tracked], axes: &[Option<Axes>], params: &Params) -> Option<GivenHead> {
+    let head = params.head?;
+    let frame_idx = head.frame as usize;
+    let direction = axes.get(frame_idx)?.as_ref()?.direction()?;
+    let centroid = centroid_px(&track[frame_idx])?;
+    let along =
+        (head.point[0] - centroid[0]) * direction[0] + (head.point[1] - centroid[1]) * direction[1];
+    Some(GivenHead {
+        frame_idx,
+        forward: along >= 0.0,
+    })
+}
+
 /// Takes position and direction from the raw values of the single frame.
-fn take_raw(pose: &mut Pose) {
+fn use_raw(pose: &mut Pose) {
     let Some(raw) = pose.raw else { return };
     pose.position_m = raw.position_m;
     if let Some(forward) = raw.forward {
-        point_along(pose, forward);
+        set_direction(pose, forward);
     }
+}
+
+/// Returns the measurements from which directions are estimated.
+fn measurements(
+    track: &[Tracked],
+    axes: &[Option<Axes>],
+    appearance: &HeadEvidence,
+    params: &Params,
+) -> Vec<Option<Measurement>> {
+    let measurement = |(k, tracked): (usize, &Tracked)| {
+        let sighting = tracked.sighting.as_ref()?;
+        let centroid_px = sighting.moments.centroid_px;
+        let given_head = params.head.filter(|head| head.frame as usize == k);
+        let direction = axes[k].as_ref().and_then(Axes::direction);
+        Some(Measurement {
+            centroid_px,
+            covariance_px2: sighting.moments.covariance_px2,
+            vertical_px: sighting.upright_px,
+            cut: sighting.cut,
+            given_head_px: given_head.map(|head| [0, 1].map(|c| head.point[c] - centroid_px[c])),
+            head_evidence: (direction.zip(appearance.half_log_odds[k]))
+                .map(|(direction, half_log_odds)| direction.map(|c| c * half_log_odds)),
+        })
+    };
+    track.iter().enumerate().map(measurement).collect()
 }
 
 /// Writes position and direction as estimated from all frames together.
 ///
 /// Without a camera or the animal's size, only the heading is written, computed with a typical camera.
-fn best_estimate(
-    poses: &mut Poses,
-    track: &[Tracked],
-    axes: &[Option<Axes>],
-    ends: &Ends,
-    params: &Params,
-) {
-    let seen: Vec<Option<Seen>> = track
-        .iter()
-        .enumerate()
-        .map(|(k, tracked)| {
-            let sighting = tracked.sighting.as_ref()?;
-            let centroid_px = sighting.moments.centroid_px;
-            let pin = params.head.filter(|head| head.frame as usize == k);
-            Some(Seen {
-                centroid_px,
-                covariance_px2: sighting.moments.covariance_px2,
-                upright_px: sighting.upright_px,
-                cut: sighting.cut,
-                toward: pin.map(|head| [0, 1].map(|c| head.point[c] - centroid_px[c])),
-                ends: axes[k]
-                    .as_ref()
-                    .and_then(Axes::direction)
-                    .zip(ends.evidence[k])
-                    .map(|(u, evidence)| u.map(|c| c * evidence)),
-            })
-        })
-        .collect();
+fn set_directions(poses: &mut Poses, measured: &[Option<Measurement>]) {
     let known = poses.camera.zip(poses.animal);
     let (camera, animal) = known.unwrap_or_else(|| {
         let [width, height] = poses.image_size_px;
-        (
-            direction::usual_camera(width, height),
-            direction::usual_animal(&seen),
-        )
+        let camera = direction::typical_camera(width, height);
+        (camera, direction::typical_animal(measured))
     });
-    let directions = direction::estimate(&seen, &camera, &animal, poses.fps);
+    let directions = direction::estimate(measured, &camera, &animal, poses.fps);
     for (pose, direction) in poses.frames.iter_mut().zip(directions) {
         let Some(direction) = direction else { continue };
         pose.head_confidence = Some(direction.head_confidence);
@@ -184,12 +199,12 @@ fn best_estimate(
         let (centroid, depth) = (direction.centroid_px, direction.z_apparent_m);
         pose.position_m = Some(camera.point_in_camera(centroid, depth));
         pose.depth_sign_confidence = Some(direction.depth_sign_confidence);
-        point_along(pose, direction.forward);
+        set_direction(pose, direction.forward);
     }
 }
 
 /// Writes a direction in space, and its heading, yaw, pitch and angle to the image plane.
-fn point_along(pose: &mut Pose, forward: [f64; 3]) {
+fn set_direction(pose: &mut Pose, forward: [f64; 3]) {
     let [x, y, z] = forward;
     pose.forward = Some(forward);
     pose.heading_rad = Some(libm::atan2(y, x));
@@ -198,53 +213,27 @@ fn point_along(pose: &mut Pose, forward: [f64; 3]) {
     pose.gamma_rad = Some(libm::atan2(z.abs(), libm::hypot(x, y)));
 }
 
-/// Smoothed path of the centroid, pixels.
-pub struct Motion {
-    /// Horizontal coordinate.
-    pub x: Smoothed,
-    /// Vertical coordinate.
-    pub y: Smoothed,
-}
-
-impl Motion {
-    fn of(track: &[Tracked], fps: f64) -> Motion {
-        let coordinate = |k: usize| -> Vec<Option<f64>> {
-            track
-                .iter()
-                .map(|t| t.sighting.as_ref().map(|s| s.moments.centroid_px[k]))
-                .collect()
-        };
-        Motion {
-            x: smooth(&coordinate(0), fps),
-            y: smooth(&coordinate(1), fps),
-        }
-    }
-
-    /// Returns the velocity in each frame, pixels per second; `None` in gaps.
-    pub fn velocity_px(&self) -> Vec<Option<[f64; 2]>> {
-        self.x
-            .rate
-            .iter()
-            .zip(&self.y.rate)
-            .map(|(x, y)| Some([(*x)?, (*y)?]))
-            .collect()
-    }
+/// Returns the velocity of the smoothed centroid in each frame, pixels per second; `None` in long gaps.
+pub(super) fn velocity_px(centroids_px: &[Option<[f64; 2]>], fps: f64) -> Vec<Option<[f64; 2]>> {
+    let rate = |c: usize| {
+        let coordinates: Vec<_> = centroids_px.iter().map(|p| p.map(|p| p[c])).collect();
+        smoothed_rates(&coordinates, fps)
+    };
+    let (x, y) = (rate(0), rate(1));
+    x.into_iter().zip(y).map(|(x, y)| Some([x?, y?])).collect()
 }
 
 /// Returns the animal's full length in the image: the 80th percentile of its lengths, at least 1 pixel.
-pub fn reference_length_px(axes: &[Option<Axes>]) -> f64 {
-    let mut lengths: Vec<f64> = axes.iter().flatten().map(|a| a.length_px).collect();
-    if lengths.is_empty() {
-        return 1.0;
-    }
-    let rank = lengths.len() * 4 / 5;
-    lengths
-        .select_nth_unstable_by(rank, f64::total_cmp)
-        .1
-        .max(1.0)
+/// Returns `None` without lengths.
+pub(super) fn reference_length_px(lengths_px: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut lengths_px: Vec<f64> = lengths_px.collect();
+    lengths_px.sort_by(f64::total_cmp);
+    let length_px = lengths_px.get(lengths_px.len() * 4 / 5)?;
+    Some(length_px.max(1.0))
 }
 
-fn seen(tracked: &Tracked) -> Pose {
+/// Returns a pose with the values of the detection only.
+fn detection(tracked: &Tracked) -> Pose {
     let mut pose = Pose {
         time_s: tracked.time_s,
         ..Pose::default()
@@ -272,28 +261,28 @@ fn length_axes(track: &[Tracked], view: View, rule: AxisAndHead) -> Vec<Option<A
         .map(|tracked| {
             let sighting = tracked.sighting.as_ref()?;
             if view == View::Top && rule == AxisAndHead::Corrected {
-                return Some(along_body(sighting));
+                return Some(axes_of_body(sighting));
             }
             let Some(major) = sighting.moments.major_rad else {
-                return Some(along(sighting, true));
+                return Some(axes_of_moments(sighting, true));
             };
-            let minor = half_circle(major + FRAC_PI_2);
-            let upright = |axis: f64| FRAC_PI_2 - axis.abs();
-            let lead = upright(major) - upright(minor);
-            let near = |last: f64| half_circle(major - last).abs() <= FRAC_PI_4;
+            let minor = fold_axis_rad(major + FRAC_PI_2);
+            let from_vertical = |axis: f64| FRAC_PI_2 - axis.abs();
+            let lead = from_vertical(major) - from_vertical(minor);
+            let near = |last: f64| fold_axis_rad(major - last).abs() <= FRAC_PI_4;
             let major_is_length = match last.map(near) {
-                Some(true) => lead > -MEMORY_RAD,
-                Some(false) => lead > MEMORY_RAD,
+                Some(true) => lead > -SWITCH_LEAD_RAD,
+                Some(false) => lead > SWITCH_LEAD_RAD,
                 None => lead >= 0.0,
             };
-            let axes = along(sighting, major_is_length);
+            let axes = axes_of_moments(sighting, major_is_length);
             last = axes.axis_rad.filter(|_| rule == AxisAndHead::Corrected);
             Some(axes)
         })
         .collect()
 }
 
-fn along_body(sighting: &Sighting) -> Axes {
+fn axes_of_body(sighting: &Sighting) -> Axes {
     let (moments, extent) = (&sighting.moments, sighting.body_extent_px);
     let turned = sighting
         .body_rad
@@ -307,7 +296,7 @@ fn along_body(sighting: &Sighting) -> Axes {
     }
 }
 
-fn along(sighting: &Sighting, major_is_length: bool) -> Axes {
+fn axes_of_moments(sighting: &Sighting, major_is_length: bool) -> Axes {
     let (moments, extent) = (&sighting.moments, sighting.extent_px);
     if major_is_length {
         let axis_rad = moments.major_rad;
@@ -319,7 +308,7 @@ fn along(sighting: &Sighting, major_is_length: bool) -> Axes {
         };
     }
     let turned = moments.major_rad.map(|major| major + FRAC_PI_2);
-    let axis_rad = turned.map(half_circle);
+    let axis_rad = turned.map(fold_axis_rad);
     // The skew refers to major + pi/2; folding may reverse the axis.
     let folded = turned.is_some_and(|turned| turned > FRAC_PI_2);
     let skew = if folded {
@@ -336,7 +325,7 @@ fn along(sighting: &Sighting, major_is_length: bool) -> Axes {
 }
 
 /// Returns the angle of an axis, folded into (-pi/2, pi/2].
-fn half_circle(angle_rad: f64) -> f64 {
+fn fold_axis_rad(angle_rad: f64) -> f64 {
     let folded = wrap_rad(2.0 * angle_rad) / 2.0;
     if folded <= -FRAC_PI_2 {
         FRAC_PI_2

@@ -1,27 +1,22 @@
-//! Smooths a time series: constant-velocity Kalman filter and Rauch-Tung-Striebel smoother (1965).
+//! Rates of change of a smoothed time series: constant-velocity Kalman filter and Rauch-Tung-Striebel
+//! smoother (1965).
 //!
 //! Large innovations get Huber weights. Second differences of the data give the measurement noise. The
 //! process noise is the candidate with the greatest likelihood. See docs/explanation/algorithms.md, "Pose".
 
-/// A smoothed series.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Smoothed {
-    /// Smoothed values, one per measurement; `None` in long gaps and outside the measured range.
-    pub value: Vec<Option<f64>>,
-    /// Rates of change, per second; `None` where the value is.
-    pub rate: Vec<Option<f64>>,
-}
+use crate::order::median;
 
 /// Standard deviations beyond which an innovation counts less. Free choice.
 const HUBER: f64 = 2.5;
 /// Longest gap that is bridged, seconds. Free choice.
 const BRIDGE_S: f64 = 0.5;
 
-/// Smooths measurements taken every `1 / fps` seconds; `None` marks a missing one.
+/// Returns the rates of change of measurements taken every `1 / fps` seconds, per second. `None` marks a
+/// missing measurement.
 ///
 /// Gaps up to half a second are bridged. Longer gaps stay empty, as do the times before the first and after
 /// the last measurement.
-pub fn smooth(measured: &[Option<f64>], fps: f64) -> Smoothed {
+pub(super) fn smoothed_rates(measured: &[Option<f64>], fps: f64) -> Vec<Option<f64>> {
     let noise = measurement_variance(measured);
     let dt = 1.0 / fps;
     let likelihood = |q: f64| filter(measured, dt, q, noise).log_likelihood;
@@ -35,28 +30,18 @@ pub fn smooth(measured: &[Option<f64>], fps: f64) -> Smoothed {
             .fold((f64::NEG_INFINITY, unit), |best, next| {
                 if next.0 > best.0 { next } else { best }
             });
-    back(
-        &filter(measured, dt, best.1, noise),
-        measured,
-        dt,
-        (BRIDGE_S * fps).round() as usize,
-    )
+    let filtered = filter(measured, dt, best.1, noise);
+    let max_gap = (BRIDGE_S * fps).round() as usize;
+    smooth_backward(&filtered, measured, dt, max_gap)
 }
 
 /// Returns the variance of white noise on a smooth signal.
 ///
 /// Second differences of such noise have six times its variance. Their median absolute value is robust.
 fn measurement_variance(measured: &[Option<f64>]) -> f64 {
-    let mut seconds: Vec<f64> = measured
-        .windows(3)
-        .filter_map(|w| Some((w[0]? - 2.0 * w[1]? + w[2]?).abs()))
-        .collect();
-    if seconds.is_empty() {
-        return 1e-12;
-    }
-    let middle = seconds.len() / 2;
-    let median = *seconds.select_nth_unstable_by(middle, f64::total_cmp).1;
-    (1.4826 * median).powi(2).max(1e-12) / 6.0
+    let second_differences =
+        (measured.windows(3)).filter_map(|w| Some((w[0]? - 2.0 * w[1]? + w[2]?).abs()));
+    median(second_differences).map_or(1e-12, |median| (1.4826 * median).powi(2).max(1e-12) / 6.0)
 }
 
 /// A state (value, rate) and its covariance.
@@ -136,8 +121,13 @@ fn predict(state: &State, dt: f64, q: f64) -> State {
     }
 }
 
-/// Runs the backward pass and removes the gaps longer than `bridge` frames.
-fn back(filtered: &Filtered, measured: &[Option<f64>], dt: f64, bridge: usize) -> Smoothed {
+/// Runs the backward pass and removes the gaps longer than `max_gap` frames.
+fn smooth_backward(
+    filtered: &Filtered,
+    measured: &[Option<f64>],
+    dt: f64,
+    max_gap: usize,
+) -> Vec<Option<f64>> {
     let n = measured.len();
     let mut smoothed: Vec<[f64; 2]> = filtered.updated.iter().map(|s| s.x).collect();
     for k in (0..n.saturating_sub(1)).rev() {
@@ -161,28 +151,20 @@ fn back(filtered: &Filtered, measured: &[Option<f64>], dt: f64, bridge: usize) -
             *value += row[0] * step[0] + row[1] * step[1];
         }
     }
-    let known = bridged(measured, bridge);
-    let take = |part: usize| {
-        smoothed
-            .iter()
-            .zip(&known)
-            .map(|(s, &k)| k.then_some(s[part]))
-            .collect()
-    };
-    Smoothed {
-        value: take(0),
-        rate: take(1),
-    }
+    let known = bridged(measured, max_gap);
+    (smoothed.iter().zip(known))
+        .map(|(&[_, rate], known)| known.then_some(rate))
+        .collect()
 }
 
-/// Returns true for measurements and for gaps of at most `bridge` frames between two of them.
-fn bridged(measured: &[Option<f64>], bridge: usize) -> Vec<bool> {
+/// Returns true for measurements and for gaps of at most `max_gap` frames between two of them.
+fn bridged(measured: &[Option<f64>], max_gap: usize) -> Vec<bool> {
     let mut known: Vec<bool> = measured.iter().map(Option::is_some).collect();
     let mut last = None;
     for (idx, value) in measured.iter().enumerate() {
         if value.is_some() {
             if let Some(last) = last
-                && idx - last - 1 <= bridge
+                && idx - last - 1 <= max_gap
             {
                 known[last..idx].fill(true);
             }
@@ -205,32 +187,35 @@ mod tests {
         Some(wave(k) + 0.5 * random::normal(3, &[k as u64]))
     }
 
-    fn rmse(values: &[Option<f64>]) -> f64 {
-        let gaps = values
-            .iter()
-            .enumerate()
-            .filter_map(|(k, v)| Some((v.as_ref()? - wave(k)).powi(2)));
-        (gaps.clone().sum::<f64>() / gaps.count() as f64).sqrt()
+    /// Returns the rate of the wave, per second.
+    fn wave_rate(k: usize) -> f64 {
+        15.0 * libm::cos(k as f64 * 0.05)
+    }
+
+    fn rmse(rates: &[Option<f64>]) -> f64 {
+        let error =
+            |(k, rate): (usize, &Option<f64>)| Some((rate.as_ref()? - wave_rate(k)).powi(2));
+        let errors = rates.iter().enumerate().filter_map(error);
+        (errors.clone().sum::<f64>() / errors.count() as f64).sqrt()
     }
 
     #[test]
     fn noise_is_reduced_and_the_signal_kept() {
         let measured: Vec<Option<f64>> = (0..400).map(noisy).collect();
-        let smoothed = smooth(&measured, 30.0);
-        assert!(
-            rmse(&smoothed.value) < 0.5 * rmse(&measured),
-            "{}",
-            rmse(&smoothed.value)
-        );
+        let difference =
+            |k: usize| Some((measured.get(k + 1)?.as_ref()? - measured[k].as_ref()?) * 30.0);
+        let differences: Vec<Option<f64>> = (0..400).map(difference).collect();
+        let rates = smoothed_rates(&measured, 30.0);
+        assert!(rmse(&rates) < 0.2 * rmse(&differences), "{}", rmse(&rates));
     }
 
     #[test]
-    fn a_wild_value_hardly_counts() {
+    fn an_outlier_hardly_counts() {
         let mut measured: Vec<Option<f64>> = (0..200).map(noisy).collect();
         measured[100] = Some(80.0);
-        let smoothed = smooth(&measured, 30.0);
-        let pulled = smoothed.value[100].expect("measured") - wave(100);
-        assert!(pulled.abs() < 3.0, "{pulled} of 80");
+        let rates = smoothed_rates(&measured, 30.0);
+        // Differences between neighbors are off by about 2000 per second.
+        assert!(rmse(&rates) < 10.0, "{}", rmse(&rates));
     }
 
     #[test]
@@ -239,15 +224,15 @@ mod tests {
         measured[50..60].fill(None);
         measured[100..140].fill(None);
         measured[..3].fill(None);
-        let smoothed = smooth(&measured, 30.0);
-        assert!((smoothed.value[55].expect("bridged") - wave(55)).abs() < 1.0);
-        assert_eq!((smoothed.value[120], smoothed.value[1]), (None, None));
+        let rates = smoothed_rates(&measured, 30.0);
+        assert!((rates[55].expect("bridged") - wave_rate(55)).abs() < 8.0);
+        assert_eq!((rates[120], rates[1]), (None, None));
     }
 
     #[test]
     fn rates_are_per_second() {
         let measured: Vec<Option<f64>> = (0..100).map(|k| Some(k as f64 * 0.1)).collect();
-        let rate = smooth(&measured, 30.0).rate[50].expect("measured");
+        let rate = smoothed_rates(&measured, 30.0)[50].expect("measured");
         assert!((rate - 3.0).abs() < 1e-3, "{rate}");
     }
 }

@@ -9,16 +9,16 @@ use crate::library::View;
 use crate::order::{median, percentile};
 
 /// Least length of a usable silhouette, as a share of the 90th percentile of lengths. Free choice.
-const AT_LENGTH: f64 = 0.7;
+const MIN_LENGTH_SHARE: f64 = 0.7;
 /// Least ratio of the standard deviations along and across the axis. Free choice.
-const LONG: f64 = 1.3;
+const MIN_ELONGATION: f64 = 1.3;
 /// Least number of usable frames; with fewer the view is unknown. Free choice.
-const LEAST_FRAMES: usize = 8;
+const MIN_FRAMES: usize = 8;
 /// Asymmetry at which both views are equally likely, standard deviations squared. On the labelled clips, it
 /// is 0.07 to 0.7 from above and at least 4 from the side.
-const EVEN: f64 = 1.7;
+const EVEN_ASYMMETRY: f64 = 1.7;
 /// Greatest probability of a guess. Free choice.
-const MOST: f64 = 0.99;
+const MAX_PROBABILITY: f64 = 0.99;
 
 /// Returns the guessed view and the probability that it is right, 0.5..=1.
 ///
@@ -36,15 +36,15 @@ pub(super) fn guess(track: &[Tracked]) -> (View, f64) {
     let mut lengths: Vec<f64> = whole().map(|s| s.extent_px[0]).collect();
     let longest = percentile(&mut lengths, 0.9).unwrap_or(0.0);
     let level: Vec<&Sighting> = whole()
-        .filter(|s| s.extent_px[0] >= AT_LENGTH * longest)
-        .filter(|s| s.moments.eigenvalue_ratio >= LONG * LONG)
+        .filter(|s| s.extent_px[0] >= MIN_LENGTH_SHARE * longest)
+        .filter(|s| s.moments.eigenvalue_ratio >= MIN_ELONGATION * MIN_ELONGATION)
         .filter(|s| {
             s.moments
                 .major_rad
                 .is_some_and(|axis| axis.abs() < FRAC_PI_3)
         })
         .collect();
-    if level.len() < LEAST_FRAMES {
+    if level.len() < MIN_FRAMES {
         return (View::Side, 0.5);
     }
     let mass = level.iter().map(|s| s.moments.skew[1]);
@@ -52,11 +52,12 @@ pub(super) fn guess(track: &[Tracked]) -> (View, f64) {
         .iter()
         .filter_map(|s| Some(s.asymmetry.as_ref()?.shade));
     let asymmetry = constancy(mass.collect()).powi(2) + constancy(shade.collect()).powi(2);
-    let odds = (asymmetry / EVEN).powi(2);
+    let odds = (asymmetry / EVEN_ASYMMETRY).powi(2);
     let side = odds / (1.0 + odds);
-    match side >= 0.5 {
-        true => (View::Side, side.min(MOST)),
-        false => (View::Top, (1.0 - side).min(MOST)),
+    if side >= 0.5 {
+        (View::Side, side.min(MAX_PROBABILITY))
+    } else {
+        (View::Top, (1.0 - side).min(MAX_PROBABILITY))
     }
 }
 
@@ -70,15 +71,15 @@ fn constancy(values: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::pose::painted::{Look, fish};
+    use crate::analysis::pose::synthetic::{Appearance, fish};
 
-    fn tracked(look: impl Fn(usize) -> Look) -> Vec<Tracked> {
-        (0..40).map(|k| fish(k, look(k))).collect()
+    fn tracked(appearance: impl Fn(usize) -> Appearance) -> Vec<Tracked> {
+        (0..40).map(|k| fish(k, appearance(k))).collect()
     }
 
     #[test]
-    fn a_dark_back_above_a_light_belly_is_seen_from_the_side() {
-        let (view, probability) = guess(&tracked(|k| Look {
+    fn a_dark_back_above_a_light_belly_means_side_view() {
+        let (view, probability) = guess(&tracked(|k| Appearance {
             is_left: k >= 20,
             is_upper_dark: true,
         }));
@@ -87,9 +88,8 @@ mod tests {
     }
 
     #[test]
-    fn a_light_flank_that_is_up_when_it_goes_one_way_and_down_when_it_goes_back_is_seen_from_above()
-    {
-        let (view, probability) = guess(&tracked(|k| Look {
+    fn a_light_flank_that_changes_sides_with_the_direction_means_top_view() {
+        let (view, probability) = guess(&tracked(|k| Appearance {
             is_left: k >= 20,
             is_upper_dark: k >= 20,
         }));
@@ -98,12 +98,12 @@ mod tests {
     }
 
     #[test]
-    fn of_a_few_frames_nothing_is_known() {
-        let look = Look {
+    fn few_frames_leave_the_view_unknown() {
+        let appearance = Appearance {
             is_left: false,
             is_upper_dark: true,
         };
-        let few: Vec<Tracked> = (0..LEAST_FRAMES - 1).map(|k| fish(k, look)).collect();
+        let few: Vec<Tracked> = (0..MIN_FRAMES - 1).map(|k| fish(k, appearance)).collect();
         assert_eq!(guess(&few), (View::Side, 0.5));
     }
 }

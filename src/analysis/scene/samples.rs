@@ -12,7 +12,7 @@ use super::background::Background;
 use super::light;
 use super::thumbnail::Thumbnail;
 use crate::analysis::params::AnimalAtParam;
-use crate::analysis::{Error, LEAST_FRAMES, Params};
+use crate::analysis::{Error, MIN_FRAMES, Params};
 use crate::footage::{FrameSource, spread_idx};
 use crate::geometry::Rect;
 use crate::progress::Progress;
@@ -68,10 +68,10 @@ impl Samples {
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }
-        if format.n_frames_hint < LEAST_FRAMES || frames.is_empty() {
+        if format.n_frames_hint < MIN_FRAMES || frames.is_empty() {
             return Err(Error::TooFewFrames {
                 n_frames: format.n_frames_hint,
-                least: LEAST_FRAMES,
+                least: MIN_FRAMES,
             });
         }
         let mut frame_idx = spread_idx(format.n_frames_hint, n_kept);

@@ -8,16 +8,16 @@ mod tests;
 pub use advice::{Advice, Motion, advice};
 
 use super::pose;
-use super::pose::smooth::smooth;
-use super::transition::Connections;
+use super::similarity::transition::Connections;
 use crate::geometry::wrap_rad;
-use crate::library::{LibraryStats, Poses};
+use crate::library::{LibraryStats, Pose, Poses};
+use crate::order::percentile;
 
 /// Number of bins in the heading histogram: 10 degrees each, starting at -180.
 const N_BINS: usize = 36;
 
 /// Returns the statistics of a library. The caller adds the values about the scene and the sprites.
-pub(super) fn of(poses: &Poses, connections: &Connections) -> LibraryStats {
+pub(super) fn library_stats(poses: &Poses, connections: &Connections) -> LibraryStats {
     let component = &connections.playback.component;
     let length_px = length_px(poses);
     LibraryStats {
@@ -38,22 +38,8 @@ pub(super) fn of(poses: &Poses, connections: &Connections) -> LibraryStats {
 /// Returns the length of the animal in the image when seen broadside (80th percentile), pixels; `None` if no
 /// frame shows it uncut.
 pub fn length_px(poses: &Poses) -> Option<f64> {
-    let axes: Vec<Option<pose::Axes>> = poses
-        .frames
-        .iter()
-        .map(|p| {
-            let (length_px, height_px, skew) = (p.length_px?, p.height_px?, p.skew?);
-            (!p.cut).then_some(pose::Axes {
-                axis_rad: p.axis_rad,
-                length_px,
-                height_px,
-                skew,
-            })
-        })
-        .collect();
-    axes.iter()
-        .any(Option::is_some)
-        .then(|| pose::reference_length_px(&axes))
+    let uncut = poses.frames.iter().filter(|pose| !pose.cut);
+    pose::reference_length_px(uncut.filter_map(|pose| pose.length_px))
 }
 
 fn histogram(poses: &Poses, component: &[u32]) -> Vec<u32> {
@@ -69,31 +55,24 @@ fn histogram(poses: &Poses, component: &[u32]) -> Vec<u32> {
 
 /// Returns the 5th, 50th and 95th percentile of the smoothed centroid's speed, body lengths per second.
 fn speeds(poses: &Poses, length_px: f64) -> Option<[f64; 3]> {
-    let along = |k: usize| -> Vec<Option<f64>> {
-        poses
-            .frames
-            .iter()
-            .map(|p| p.centroid_px.map(|c| c[k]))
-            .collect()
-    };
-    let (x, y) = (smooth(&along(0), poses.fps), smooth(&along(1), poses.fps));
-    let speed = |(x, y): (&Option<f64>, &Option<f64>)| Some(libm::hypot((*x)?, (*y)?) / length_px);
-    let mut speeds: Vec<f64> = x.rate.iter().zip(&y.rate).filter_map(speed).collect();
-    speeds.sort_by(f64::total_cmp);
-    let at = |share: f64| speeds[((speeds.len() - 1) as f64 * share).round() as usize];
-    (!speeds.is_empty()).then(|| [at(0.05), at(0.5), at(0.95)])
+    let centroids: Vec<_> = poses.frames.iter().map(|pose| pose.centroid_px).collect();
+    let velocities = pose::velocity_px(&centroids, poses.fps);
+    let speed = |[x, y]: [f64; 2]| libm::hypot(x, y) / length_px;
+    let mut speeds: Vec<f64> = velocities.into_iter().flatten().map(speed).collect();
+    let mut speed_at = |share: f64| percentile(&mut speeds, share);
+    Some([speed_at(0.05)?, speed_at(0.5)?, speed_at(0.95)?])
 }
 
 /// Returns the 95th percentile of the turning rate, radians per second, over 0.1 s on each side of a frame.
 fn turn_rate(poses: &Poses) -> Option<f64> {
-    let reach = ((poses.fps * 0.1).round() as usize).max(1);
-    let rate = |pair: &[crate::library::Pose]| {
-        let (first, last) = (pair[0].heading_rad?, pair[2 * reach].heading_rad?);
-        Some(wrap_rad(last - first).abs() * poses.fps / (2 * reach) as f64)
+    let half_span = ((poses.fps * 0.1).round() as usize).max(1);
+    let rate = |pair: &[Pose]| {
+        let (first, last) = (pair[0].heading_rad?, pair[2 * half_span].heading_rad?);
+        Some(wrap_rad(last - first).abs() * poses.fps / (2 * half_span) as f64)
     };
     let mut rates: Vec<f64> = poses
         .frames
-        .windows(2 * reach + 1)
+        .windows(2 * half_span + 1)
         .filter_map(rate)
         .collect();
     rates.sort_by(f64::total_cmp);

@@ -69,7 +69,7 @@ fn all_round(frame: usize) -> f64 {
     PI / 2.0 * (frame / 75) as f64
 }
 
-fn said(library: &Library, mirror: bool) -> Vec<(&'static str, String)> {
+fn advice_texts(library: &Library, mirror: bool) -> Vec<(&'static str, String)> {
     let params = Params {
         mirror,
         ..Params::default()
@@ -79,26 +79,29 @@ fn said(library: &Library, mirror: bool) -> Vec<(&'static str, String)> {
 }
 
 fn codes(library: &Library, mirror: bool) -> Vec<&'static str> {
-    said(library, mirror).iter().map(|said| said.0).collect()
+    advice_texts(library, mirror)
+        .iter()
+        .map(|(code, _)| *code)
+        .collect()
 }
 
 #[test]
-fn a_good_library_is_given_no_advice() {
-    assert_eq!(said(&library(View::Side, all_round), false), []);
+fn a_good_library_gets_no_advice() {
+    assert_eq!(advice_texts(&library(View::Side, all_round), false), []);
     let winding = |frame: usize| 2.0 * libm::sin(frame as f64 / 40.0);
-    assert_eq!(said(&library(View::Top, winding), false), []);
+    assert_eq!(advice_texts(&library(View::Top, winding), false), []);
 }
 
 #[test]
-fn from_the_side_a_direction_that_is_never_shown_is_named() {
+fn in_side_view_a_missing_direction_is_named() {
     let never_up = |frame| all_round(frame).min(PI);
     let sentence = "the footage never shows the animal heading up: film for longer".to_owned();
     let library = library(View::Side, never_up);
-    assert_eq!(said(&library, true), [("lacks_up", sentence)]);
+    assert_eq!(advice_texts(&library, true), [("lacks_up", sentence)]);
 }
 
 #[test]
-fn mirrors_make_left_of_right() {
+fn mirroring_replaces_a_missing_direction() {
     let never_left = |frame| match all_round(frame) {
         heading if heading == PI => 0.0,
         heading => heading,
@@ -116,29 +119,29 @@ fn mirrors_make_left_of_right() {
 }
 
 #[test]
-fn what_was_filmed_but_cannot_be_played_is_told_from_what_was_never_filmed() {
+fn advice_distinguishes_unplayable_from_never_filmed() {
     let mut library = library(View::Side, all_round);
     library.playback.component.truncate(225);
     library.stats.heading_histogram = histogram(&library.poses, &library.playback.component);
     library.stats.component_share = 0.75;
-    let said_of = said(&library, true);
-    assert_eq!(said_of.len(), 1);
+    let texts = advice_texts(&library, true);
+    assert_eq!(texts.len(), 1);
     assert!(
-        said_of[0]
+        texts[0]
             .1
             .contains("heading up for 2.5 s, but in no part that playback can use")
     );
     library.playback.component.push(299);
     library.stats.heading_histogram = histogram(&library.poses, &library.playback.component);
     assert!(
-        said(&library, true)[0]
+        advice_texts(&library, true)[0]
             .1
             .ends_with("for only 0.1 s: film for longer")
     );
 }
 
 #[test]
-fn from_above_a_way_of_turning_that_is_never_shown_is_named() {
+fn in_top_view_a_missing_turn_is_named() {
     let rightward = |frame: usize| 0.03 * frame.saturating_sub(100) as f64;
     let circling = |frame: usize| -0.03 * frame as f64;
     assert_eq!(
@@ -154,35 +157,38 @@ fn from_above_a_way_of_turning_that_is_never_shown_is_named() {
 }
 
 #[test]
-fn an_animal_that_rests_is_said_to_rest() {
+fn an_animal_that_mostly_rests_gets_advice() {
     let mut library = library(View::Side, all_round);
     for pose in &mut library.poses.frames[30..] {
         pose.centroid_px = Some([40.0, 50.0]);
     }
-    let said = said(&library, true);
-    assert_eq!(said.len(), 1);
-    assert_eq!(said[0].0, "mostly_rests");
-    assert!(said[0].1.contains("moves in only 10 %"), "{}", said[0].1);
+    let texts = advice_texts(&library, true);
+    assert_eq!(texts.len(), 1);
+    assert_eq!(texts[0].0, "mostly_rests");
+    assert!(texts[0].1.contains("moves in only 10 %"), "{}", texts[0].1);
 }
 
 #[test]
-fn little_playback_few_jumps_and_loose_ones_are_said_with_their_numbers() {
+fn advice_on_playback_states_its_numbers() {
     let mut library = library(View::Side, all_round);
     library.stats.component_share = 0.12;
     library.stats.kappa_used = Some(4.0);
     library.playback.jumps.truncate(5);
-    let said = said(&library, true);
-    let sentences: Vec<&str> = said.iter().map(|said| said.1.as_str()).collect();
+    let texts = advice_texts(&library, true);
+    let sentences: Vec<&str> = texts
+        .iter()
+        .map(|(_, sentence)| sentence.as_str())
+        .collect();
     assert!(sentences[0].contains("only 12 % of the footage (10.0 s)"));
     assert!(sentences[1].contains("at only 5 frames"));
     assert!(sentences[2].contains("4.0 times a natural step"));
-    assert_eq!(said.len(), 3);
+    assert_eq!(texts.len(), 3);
     library.playback.jumps.clear();
     assert_eq!(codes(&library, true), ["no_transitions"]);
 }
 
 #[test]
-fn how_it_was_filmed_comes_before_what_it_shows() {
+fn advice_on_filming_comes_first() {
     let mut library = library(View::Side, all_round);
     library.stats.several_animals = true;
     library.stats.n_detected = 150;

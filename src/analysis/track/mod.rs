@@ -25,7 +25,7 @@ use super::read_ahead::Batches;
 use super::scene::{Placed, Scene};
 use super::silhouette::{self, tether};
 use super::subject::{LEAST_AREA_PX, Look};
-use super::{Error, LEAST_FRAMES, Params};
+use super::{Error, MIN_FRAMES, Params};
 use crate::geometry::Rect;
 use crate::library::Mover;
 use crate::progress::Progress;
@@ -105,20 +105,19 @@ pub fn follow(
         let compared = |(k, (time_s, frame)): (usize, &(f64, Frame))| {
             compare(first + k, *time_s, frame, scene, params, &**scratch)
         };
-        let of_batch: Result<Vec<FrameResult>, Full> =
-            batch.par_iter().enumerate().map(compared).collect();
-        results.extend(of_batch?);
-        batches.give_back(batch);
-        let share = results.len() as f64 / n_frames_hint.max(1) as f64;
+        let of_batch: Result<Vec<Seen>, Full> = batch.par_iter().enumerate().map(of).collect();
+        seen.extend(of_batch?);
+        batches.recycle(batch);
+        let share = seen.len() as f64 / n_frames_hint.max(1) as f64;
         progress.report("tracking", share);
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }
     }
-    if results.len() < LEAST_FRAMES {
+    if seen.len() < MIN_FRAMES {
         return Err(Error::TooFewFrames {
-            n_frames: results.len(),
-            least: LEAST_FRAMES,
+            n_frames: seen.len(),
+            least: MIN_FRAMES,
         });
     }
     let candidates: Vec<&[Candidate]> = results.iter().map(|r| r.candidates.as_slice()).collect();

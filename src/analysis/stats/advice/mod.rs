@@ -8,12 +8,14 @@
 
 use crate::analysis::Params;
 use crate::geometry::wrap_rad;
-use crate::library::{Library, Mover, Poses, View};
+use crate::library::{Library, Poses, View};
 
-mod sentence;
+mod kind;
+
+pub use kind::{Advice, Motion};
 
 /// Playback with less than this of one motion gives advice, seconds. Free choice.
-const LEAST_MOTION_S: f64 = 0.5;
+const MIN_MOTION_S: f64 = 0.5;
 /// Number of 10-degree bins from the horizontal to the start of "up" and "down". Free choice.
 const LEVEL_BINS: usize = 3;
 /// Up to this turning rate the animal moves straight, radians per second. Equal to the gate of
@@ -22,86 +24,11 @@ const STRAIGHT_RAD_PER_S: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Above this turning rate the animal turns, radians per second. High enough to exclude heading noise.
 const TURNING_RAD_PER_S: f64 = 45.0 * std::f64::consts::PI / 180.0;
 /// A guessed view below this probability gives advice. Free choice.
-const SURE: f64 = 0.9;
+const MIN_VIEW_PROBABILITY: f64 = 0.9;
 /// Speed below which the animal rests, body lengths per second. Free choice.
 const REST_BL_PER_S: f64 = 0.1;
 /// Half the time span over which speed and turning rate are measured, seconds. Free choice.
-const REACH_S: f64 = 0.1;
-
-/// One deficiency of a library. The variants are in order of severity, the most severe first.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Advice {
-    /// The animal covers too few pixels, so there are no sprites.
-    AnimalTooSmall,
-    /// Several animals move. The largest was followed.
-    SeveralAnimals,
-    /// Number of other moving objects, and the one that moves longest.
-    OtherMovers(usize, Mover),
-    /// Number of frames that show another scene, and the time of the first, seconds.
-    ForeignFrames(usize, f64),
-    /// The guessed view and its probability, below 0.9.
-    ViewUnsure(View, f64),
-    /// Share of the frames in which the animal was found, below 0.8.
-    SeldomFound(f64),
-    /// Share of the frames with the animal in which it touches the border, above 0.2.
-    OftenAtBorder(f64),
-    /// Playback always ends, so no flock can be made.
-    NoTransitions,
-    /// Share of the frames and duration (seconds) of endless playback: below 0.5 or below 4 s.
-    LittlePlayback(f64, f64),
-    /// Number of frames from which playback can jump, below 20.
-    FewJumps(usize),
-    /// Multiple of the natural step that epsilon needed, above the requested `kappa`.
-    LooseJumps(f64),
-    /// Share of playable frames in which the animal moves, below 0.25.
-    MostlyRests(f64),
-    /// A motion, its duration in playback (below 0.5 s), and its duration in the footage, seconds.
-    Lacks(Motion, f64, f64),
-}
-
-/// A motion that a flock should be able to show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
-    /// Side view: within 30 degrees of the right of the image.
-    Right,
-    /// Side view: within 30 degrees of the left of the image.
-    Left,
-    /// Side view with mirrored playback: right or left.
-    Level,
-    /// Side view: more than 30 degrees above the horizontal.
-    Up,
-    /// Side view: more than 30 degrees below the horizontal.
-    Down,
-    /// Top view: turns left by more than 45 degrees per second.
-    TurningLeft,
-    /// Top view: turns right by more than 45 degrees per second.
-    TurningRight,
-    /// Top view with mirrored playback: turns left or right.
-    Turning,
-    /// Top view: moves, and turns by at most 20 degrees per second.
-    Straight,
-}
-
-impl Advice {
-    /// Returns the stable code, for use by programs.
-    pub fn code(&self) -> &'static str {
-        match self {
-            Advice::AnimalTooSmall => "animal_too_small",
-            Advice::SeveralAnimals => "several_animals",
-            Advice::OtherMovers(..) => "other_movers",
-            Advice::ForeignFrames(..) => "foreign_frames",
-            Advice::ViewUnsure(..) => "view_unsure",
-            Advice::SeldomFound(_) => "seldom_found",
-            Advice::OftenAtBorder(_) => "often_at_border",
-            Advice::NoTransitions => "no_transitions",
-            Advice::LittlePlayback(..) => "little_playback",
-            Advice::FewJumps(_) => "few_jumps",
-            Advice::LooseJumps(_) => "loose_jumps",
-            Advice::MostlyRests(_) => "mostly_rests",
-            Advice::Lacks(motion, ..) => motion.names().0,
-        }
-    }
-}
+const HALF_SPAN_S: f64 = 0.1;
 
 /// Returns the advice for a library, the most severe first; empty for a good library.
 pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
@@ -114,7 +41,7 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
     if stats.several_animals {
         all.push(Advice::SeveralAnimals);
     }
-    of_scene(library, &mut all);
+    add_scene_advice(library, &mut all);
     let found = stats.n_detected as f64 / stats.n_frames.max(1) as f64;
     if found < 0.8 {
         all.push(Advice::SeldomFound(found));
@@ -124,53 +51,57 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
     if cut > 0.2 {
         all.push(Advice::OftenAtBorder(cut));
     }
-    match library.playback.jumps.is_empty() {
+    if !library.playback.jumps.is_empty() {
+        add_playback_advice(library, params, &mut all);
+    } else if !stats.animal_too_small {
         // Without sprites nothing is compared. The size of the animal is then the reason.
-        true if stats.animal_too_small => {}
-        true => all.push(Advice::NoTransitions),
-        false => of_playback(library, params, &mut all),
+        all.push(Advice::NoTransitions);
     }
     all
 }
 
 /// Adds advice about other moving objects, other scenes and the view.
-fn of_scene(library: &Library, all: &mut Vec<Advice>) {
+fn add_scene_advice(library: &Library, all: &mut Vec<Advice>) {
     let (stats, poses) = (&library.stats, &library.poses);
     let longest = poses
         .other_movers
         .iter()
         .max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s)));
     if let Some(mover) = longest {
-        all.push(Advice::OtherMovers(poses.other_movers.len(), *mover));
+        all.push(Advice::OtherMovers {
+            n: poses.other_movers.len(),
+            longest: *mover,
+        });
     }
-    if let Some(from_s) = stats.first_foreign_s {
-        all.push(Advice::ForeignFrames(stats.n_foreign_frames, from_s));
+    if let Some(first_s) = stats.first_foreign_s {
+        all.push(Advice::ForeignFrames {
+            n: stats.n_foreign_frames,
+            first_s,
+        });
     }
-    match poses.view_confidence {
-        Some(probability) if probability < SURE => {
-            all.push(Advice::ViewUnsure(poses.view, probability));
-        }
-        _ => {}
+    let view_confidence = poses.view_confidence;
+    if let Some(probability) = view_confidence.filter(|&p| p < MIN_VIEW_PROBABILITY) {
+        all.push(Advice::ViewUnsure {
+            view: poses.view,
+            probability,
+        });
     }
 }
 
-fn of_playback(library: &Library, params: &Params, all: &mut Vec<Advice>) {
+fn add_playback_advice(library: &Library, params: &Params, all: &mut Vec<Advice>) {
     let playback = &library.playback;
     let share = library.stats.component_share;
-    let lasts_s = playback.component.len() as f64 / library.poses.fps;
-    if share < 0.5 || lasts_s < 4.0 {
-        all.push(Advice::LittlePlayback(share, lasts_s));
+    let duration_s = playback.component.len() as f64 / library.poses.fps;
+    if share < 0.5 || duration_s < 4.0 {
+        all.push(Advice::LittlePlayback { share, duration_s });
     }
-    let mut leaves: Vec<u32> = playback.jumps.iter().map(|jump| jump.from).collect();
-    leaves.dedup(); // jumps are sorted by where they leave
-    if leaves.len() < 20 {
-        all.push(Advice::FewJumps(leaves.len()));
+    let mut sources: Vec<u32> = playback.jumps.iter().map(|jump| jump.from).collect();
+    sources.dedup(); // jumps are sorted by `from`
+    if sources.len() < 20 {
+        all.push(Advice::FewJumps(sources.len()));
     }
-    if let Some(kappa) = library
-        .stats
-        .kappa_used
-        .filter(|&kappa| kappa > params.kappa)
-    {
+    let kappa_used = library.stats.kappa_used;
+    if let Some(kappa) = kappa_used.filter(|&kappa| kappa > params.kappa) {
         all.push(Advice::LooseJumps(kappa));
     }
     let motion = motion(library);
@@ -182,37 +113,58 @@ fn of_playback(library: &Library, params: &Params, all: &mut Vec<Advice>) {
     if moving < 0.25 {
         all.push(Advice::MostlyRests(moving));
     }
-    let lacks = match library.poses.view {
-        View::Side => of_headings(library, params.mirror),
-        View::Top => of_turns(library, &motion, params.mirror),
+    let coverage = match library.poses.view {
+        View::Side => heading_coverage(library, params.mirror),
+        View::Top => turn_coverage(library, &motion, params.mirror),
     };
-    all.extend(lacks);
+    let fps = library.poses.fps;
+    all.extend(coverage.into_iter().filter_map(|motion| motion.advice(fps)));
 }
 
-fn lacks(of: &[(Motion, usize, usize)], fps: f64) -> Vec<Advice> {
-    let seconds = |n_frames: usize| n_frames as f64 / fps;
-    of.iter()
-        .map(|&(motion, playable, filmed)| (motion, seconds(playable), seconds(filmed)))
-        .filter(|(_, playable_s, _)| *playable_s < LEAST_MOTION_S)
-        .map(|(motion, playable_s, filmed_s)| Advice::Lacks(motion, playable_s, filmed_s))
-        .collect()
+/// How long a motion is shown, frames.
+#[derive(Clone, Copy)]
+struct Coverage {
+    motion: Motion,
+    playable: usize,
+    filmed: usize,
 }
 
-/// Returns advice for side view. It compares the headings in the component with those in the footage.
-fn of_headings(library: &Library, mirror: bool) -> Vec<Advice> {
+impl Coverage {
+    /// Adds the counts of the mirrored motion, under another name.
+    fn or(self, mirrored: Coverage, motion: Motion) -> Coverage {
+        Coverage {
+            motion,
+            playable: self.playable + mirrored.playable,
+            filmed: self.filmed + mirrored.filmed,
+        }
+    }
+
+    fn advice(self, fps: f64) -> Option<Advice> {
+        let playable_s = self.playable as f64 / fps;
+        (playable_s < MIN_MOTION_S).then_some(Advice::Lacks {
+            motion: self.motion,
+            playable_s,
+            filmed_s: self.filmed as f64 / fps,
+        })
+    }
+}
+
+/// Returns the coverage of headings, for side view.
+fn heading_coverage(library: &Library, mirror: bool) -> Vec<Coverage> {
     let all: Vec<u32> = (0..library.poses.frames.len() as u32).collect();
     let filmed = by_direction(&super::histogram(&library.poses, &all));
     let playable = by_direction(&library.stats.heading_histogram);
-    let [right, down, left, up] = std::array::from_fn(|k| (playable[k], filmed[k]));
-    let sides = match mirror {
-        true => vec![(Motion::Level, right.0 + left.0, right.1 + left.1)],
-        false => vec![
-            (Motion::Right, right.0, right.1),
-            (Motion::Left, left.0, left.1),
-        ],
-    };
-    let upright = [(Motion::Up, up.0, up.1), (Motion::Down, down.0, down.1)];
-    lacks(&[sides, upright.to_vec()].concat(), library.poses.fps)
+    let motions = [Motion::Right, Motion::Down, Motion::Left, Motion::Up];
+    let [right, down, left, up] = std::array::from_fn(|k| Coverage {
+        motion: motions[k],
+        playable: playable[k],
+        filmed: filmed[k],
+    });
+    if mirror {
+        vec![right.or(left, Motion::Level), up, down]
+    } else {
+        vec![right, left, up, down]
+    }
 }
 
 /// Returns the number of frames that head right, down, left and up, from a histogram that starts at -180
@@ -232,28 +184,31 @@ fn by_direction(histogram: &[u32]) -> [usize; 4] {
     n_frames
 }
 
-/// Returns advice for top view, from the turns of the animal while it moves.
-fn of_turns(library: &Library, motion: &[FrameMotion], mirror: bool) -> Vec<Advice> {
-    let count = |holds: &dyn Fn(&FrameMotion) -> bool| {
+/// Returns the coverage of turns while the animal moves, for top view.
+fn turn_coverage(library: &Library, motion: &[FrameMotion], mirror: bool) -> Vec<Coverage> {
+    let count = |name: Motion, holds: &dyn Fn(&FrameMotion) -> bool| {
         let component = library.playback.component.iter();
-        (
-            component.filter(|&&f| holds(&motion[f as usize])).count(),
-            motion.iter().filter(|&frame| holds(frame)).count(),
-        )
+        Coverage {
+            motion: name,
+            playable: component.filter(|&&f| holds(&motion[f as usize])).count(),
+            filmed: motion.iter().filter(|&frame| holds(frame)).count(),
+        }
     };
     // The y axis points down, so an increasing heading turns to the animal's right.
-    let right = count(&|frame| frame.turn_rad_per_s > TURNING_RAD_PER_S);
-    let left = count(&|frame| frame.turn_rad_per_s < -TURNING_RAD_PER_S);
-    let straight = count(&|frame| frame.moves && frame.turn_rad_per_s.abs() <= STRAIGHT_RAD_PER_S);
-    let turns = match mirror {
-        true => vec![(Motion::Turning, left.0 + right.0, left.1 + right.1)],
-        false => vec![
-            (Motion::TurningLeft, left.0, left.1),
-            (Motion::TurningRight, right.0, right.1),
-        ],
-    };
-    let straight = (Motion::Straight, straight.0, straight.1);
-    lacks(&[turns, vec![straight]].concat(), library.poses.fps)
+    let right = count(Motion::TurningRight, &|frame| {
+        frame.turn_rad_per_s > TURNING_RAD_PER_S
+    });
+    let left = count(Motion::TurningLeft, &|frame| {
+        frame.turn_rad_per_s < -TURNING_RAD_PER_S
+    });
+    let straight = count(Motion::Straight, &|frame| {
+        frame.moves && frame.turn_rad_per_s.abs() <= STRAIGHT_RAD_PER_S
+    });
+    if mirror {
+        vec![left.or(right, Motion::Turning), straight]
+    } else {
+        vec![left, right, straight]
+    }
 }
 
 #[derive(Clone, Copy, Default)]
@@ -267,17 +222,22 @@ struct FrameMotion {
 fn motion(library: &Library) -> Vec<FrameMotion> {
     let poses = &library.poses;
     let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
-    let reach = ((poses.fps * REACH_S).round() as usize).max(1);
-    let of = |frame: usize| {
-        let (before, after) = (frame.checked_sub(reach)?, frame + reach);
-        between(poses, before, after, length_px)
+    let half_span = ((poses.fps * HALF_SPAN_S).round() as usize).max(1);
+    let motion_at = |frame: usize| {
+        let (before, after) = (frame.checked_sub(half_span)?, frame + half_span);
+        motion_between(poses, before, after, length_px)
     };
     (0..poses.frames.len())
-        .map(|frame| of(frame).unwrap_or_default())
+        .map(|frame| motion_at(frame).unwrap_or_default())
         .collect()
 }
 
-fn between(poses: &Poses, before: usize, after: usize, length_px: f64) -> Option<FrameMotion> {
+fn motion_between(
+    poses: &Poses,
+    before: usize,
+    after: usize,
+    length_px: f64,
+) -> Option<FrameMotion> {
     let span_s = (after - before) as f64 / poses.fps;
     let (before, after) = (poses.frames.get(before)?, poses.frames.get(after)?);
     let ([x0, y0], [x1, y1]) = (before.centroid_px?, after.centroid_px?);
