@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use serde_json::{Map, Value, json};
 
 use flockreel::formats::params::{Error, read};
+use flockreel::parameters::Parameters;
 use flockreel::{analysis, fish, flock};
 
 use crate::common::TestApp;
@@ -295,26 +296,24 @@ async fn values_beyond_the_limits_of_the_document_are_refused() {
 #[tokio::test]
 async fn presets_in_the_document_are_those_that_requests_may_name() {
     let schemas = Schemas::new().await;
+    let flock_presets = flock::Params::PRESETS;
+    assert!(flock_presets.contains(&"zonal"), "{flock_presets:?}");
     for ((_, read), name, presets) in [
-        (NOUNS[0], "AnalysisOverrides", json!(["papers", null])),
-        (
-            NOUNS[1],
-            "FlockOverrides",
-            json!([
-                "school", "swarm", "mill", "scatter", "zonal", "papers", null
-            ]),
-        ),
-        (
-            NOUNS[1],
-            "FlockRequest",
-            json!([
-                "school", "swarm", "mill", "scatter", "zonal", "papers", null
-            ]),
-        ),
-        (NOUNS[2], "FishRequest", json!(["papers", null])),
+        (NOUNS[0], "AnalysisOverrides", analysis::Params::PRESETS),
+        (NOUNS[1], "FlockOverrides", flock_presets),
+        (NOUNS[1], "FlockRequest", flock_presets),
+        (NOUNS[2], "FishRequest", fish::Params::PRESETS),
     ] {
-        assert_eq!(schemas.0[name]["properties"]["preset"]["enum"], presets);
-        for preset in presets.as_array().unwrap() {
+        let presets: Vec<Value> = presets
+            .iter()
+            .map(|&name| json!(name))
+            .chain([Value::Null])
+            .collect();
+        assert_eq!(
+            schemas.0[name]["properties"]["preset"]["enum"],
+            json!(presets)
+        );
+        for preset in presets {
             let overrides = Map::from_iter([("preset".to_owned(), preset.clone())]);
             assert_eq!(read(overrides), Ok(()), "{name} {preset}");
         }
