@@ -87,12 +87,13 @@ fn analyze_part(
         let track = track::follow(batches, n_frames, &scene, params, scratch, progress)?;
         Ok::<_, Error>((scene, track))
     })?;
-    let lights: Vec<usize> = scene.plates.iter().map(|plate| plate.light).collect();
-    let plate = scene.plates.swap_remove(0);
+    let backgrounds = scene.backgrounds.iter();
+    let lights: Vec<usize> = backgrounds.map(|background| background.light).collect();
+    let background = scene.backgrounds.swap_remove(0);
     let occluders = if scene.is_masked {
         None
     } else {
-        occluders::take_out(&mut track, &plate, progress)?
+        occluders::remove(&mut track, &background, progress)?
     };
     let (view, view_confidence) = pose::view(&track.frames, params);
     let animal_too_small =
@@ -107,14 +108,14 @@ fn analyze_part(
     } else {
         let by_depth = params.scale_mode == ScaleMode::Depth && view == View::Side;
         let scales = by_depth.then(|| sprite::scales(&poses));
-        let is_in_light = |plate_idx: usize| lights[plate_idx] == lights[0];
+        let is_in_light = |background_idx: usize| lights[background_idx] == lights[0];
         sprite::align(&track, view, scales, is_in_light)
     };
     let length_px = (view == View::Top)
         .then(|| stats::length_px(&poses))
         .flatten();
-    let shadow = length_px.and_then(|px| shadow::measure(&track, &plate.rgb, px));
-    let foreign = track.frames.iter().filter(|t| t.plate_idx.is_none());
+    let shadow = length_px.and_then(|px| shadow::measure(&track, &background.rgb, px));
+    let foreign = track.frames.iter().filter(|t| t.background_idx.is_none());
     let foreign_times_s: Vec<f64> = foreign.map(|t| t.time_s).collect();
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;

@@ -58,17 +58,12 @@ impl DistanceMap {
         if distances.n_clips() > MAX_COMPLETE_CLIPS {
             let limit = library.epsilon.saturating_mul(WHITE_EPSILONS);
             let near = |_: usize, pairs: &[ClipPair]| pairs.iter().copied().for_each(&mut pool);
-            distances.for_each_row_below(limit, &Everything, progress, near)?
+            distances.for_each_row_below(limit, &AllPairs, progress, near)?
         } else {
             distances.for_each_row(progress, |from, row| {
                 let pair = |(to, &distance)| ClipPair { from, to, distance };
                 (from..).zip(row).map(pair).for_each(&mut pool);
-            })?,
-            true => {
-                let limit = library.epsilon.saturating_mul(FAR);
-                let near = |_: usize, pairs: &[ClipPair]| pairs.iter().copied().for_each(&mut pool);
-                distances.for_each_row_below(limit, &AllPairs, progress, near)?
-            }
+            })?
         }
         map.mirror_triangle();
         Ok(map)

@@ -10,10 +10,11 @@ use crate::analysis::params::Eq7;
 use crate::geometry::Camera;
 use crate::library::{Animal, Poses, RawPose, View};
 
-/// Writes the raw heading of every pose. With a camera and the animal's size, also the raw position and
-/// direction.
+/// Writes the raw heading of every pose. In side view, with a camera and the animal's size, also the raw
+/// position and direction. From above they are unknown, because the silhouette does not show the height.
 pub(super) fn measure_raw(poses: &mut Poses, params: &Params) {
-    let calibrated = poses.camera.zip(poses.animal);
+    let known = poses.camera.zip(poses.animal);
+    let calibrated = known.filter(|_| poses.view == View::Side);
     let mut last_depth = None;
     for pose in &mut poses.frames {
         if !pose.detected() {
@@ -119,7 +120,7 @@ mod tests {
                 frames: vec![pose.clone()],
                 tail_beat: None,
             };
-            measure_alone(&mut poses, &Params::default());
+            measure_raw(&mut poses, &Params::default());
             poses.frames[0].raw.expect("a detected animal")
         };
         let from_side = measured(View::Side);

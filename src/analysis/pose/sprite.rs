@@ -71,11 +71,11 @@ pub fn align(
     let size = common_size(&track.frames, view, &scale);
     let matte_in_light = |tracked: &Tracked| {
         let sighting = tracked.sighting.as_ref()?;
-        let is_in_light = tracked.plate_idx.is_some_and(&is_in_light);
+        let is_in_light = tracked.background_idx.is_some_and(&is_in_light);
         is_in_light.then(|| matte(sighting))
     };
     let mattes = track.frames.iter().map(matte_in_light).collect();
-    Sprites::of(size, mattes, scales, Arc::clone(&track.scratch))
+    Sprites::new(size, mattes, scales, Arc::clone(&track.scratch))
 }
 
 fn matte(sighting: &Sighting) -> Matte {

@@ -105,18 +105,19 @@ pub fn follow(
         let compared = |(k, (time_s, frame)): (usize, &(f64, Frame))| {
             compare(first + k, *time_s, frame, scene, params, &**scratch)
         };
-        let of_batch: Result<Vec<Seen>, Full> = batch.par_iter().enumerate().map(of).collect();
-        seen.extend(of_batch?);
+        let of_batch: Result<Vec<FrameResult>, Full> =
+            batch.par_iter().enumerate().map(compared).collect();
+        results.extend(of_batch?);
         batches.recycle(batch);
-        let share = seen.len() as f64 / n_frames_hint.max(1) as f64;
+        let share = results.len() as f64 / n_frames_hint.max(1) as f64;
         progress.report("tracking", share);
         if progress.cancelled() {
             return Err(Error::Cancelled);
         }
     }
-    if seen.len() < MIN_FRAMES {
+    if results.len() < MIN_FRAMES {
         return Err(Error::TooFewFrames {
-            n_frames: seen.len(),
+            n_frames: results.len(),
             least: MIN_FRAMES,
         });
     }
