@@ -11,6 +11,7 @@ use uuid::Uuid;
 
 use super::Problem;
 use crate::code::Code;
+use crate::jobs::IdSequence;
 
 /// Id in the path. A malformed id fails with `not_found`.
 #[derive(Clone, Copy, Debug)]
@@ -52,6 +53,16 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Json<T> {
             Ok(axum::Json(body)) => Ok(Json(body)),
             Err(rejection) => Err(Problem::new(code_of(&rejection), rejection.body_text())),
         }
+    }
+}
+
+/// Ids for the things that the request creates. Those of a request with an Idempotency-Key are set by
+/// `idempotency`.
+impl<S: Send + Sync> FromRequestParts<S> for IdSequence {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<IdSequence, Infallible> {
+        Ok(parts.extensions.remove().unwrap_or_default())
     }
 }
 

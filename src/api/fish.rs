@@ -13,15 +13,17 @@ use super::AppState;
 use super::access::Caller;
 use super::download::{Download, Files, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id, Json};
-use super::jobs::{absent_result, accepted, job_to_follow};
+use super::jobs::{accepted, job_to_follow};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody, gone};
+use super::problem::{Problem, ProblemBody};
+use super::resources::{View, delete, find, get, list};
 use super::timestamp::rfc3339;
 use crate::fish::Params;
 use crate::formats::params;
 use crate::ids::{FishId, JobId, LibraryId};
-use crate::jobs::fish::{Input, Summary, enqueue};
-use crate::store::flocks::Film;
+use crate::jobs::IdSequence;
+use crate::jobs::fish::{Input, Summary};
+use crate::store::resources::{FilmRow, Fish};
 
 const FILES: Files = &[
     ("model.glb", "model/gltf-binary"),
@@ -91,13 +93,17 @@ pub(super) struct FishView {
 pub(super) async fn create_fish(
     State(state): State<AppState>,
     caller: Caller,
+    mut ids: IdSequence,
     Json(request): Json<FishRequest>,
 ) -> Result<Response<Body>, Problem> {
     let params: Params = params::read(request.params)?;
     let library_id = request.library_id;
     let after_job = job_to_follow(&state, &caller, library_id).await?;
     let input = Input { library_id, params };
-    let (job_id, fish_id) = enqueue(&state.context, &input, after_job, &caller.account).await?;
+    let queued = state
+        .context
+        .enqueue(&input, after_job, &caller.account, &mut ids);
+    let (job_id, fish_id) = queued.await?;
     let result = format!("/v1/fish/{fish_id}");
     Ok(accepted(job_id, &result, FishAccepted { job_id, fish_id }))
 }
@@ -112,11 +118,7 @@ pub(super) async fn list_fish(
     caller: Caller,
     paging: Paging,
 ) -> Result<axum::Json<Page<FishView>>, Problem> {
-    let store = &state.context.store;
-    let rows = store
-        .list_fish(paging.limit + 1, paging.cursor, &caller.reach)
-        .await?;
-    Page::of(rows, paging, |row| row.id, FishView::of)
+    list(&state, &caller, paging).await
 }
 
 /// Get one virtual fish: a summary and its parameters.
@@ -131,7 +133,7 @@ pub(super) async fn get_fish(
     caller: Caller,
     Id(id): Id,
 ) -> Result<axum::Json<FishView>, Problem> {
-    Ok(axum::Json(FishView::of(find(&state, &caller, id).await?)?))
+    get(&state, &caller, id).await
 }
 
 /// Delete a virtual fish and its job.
@@ -144,8 +146,7 @@ pub(super) async fn delete_fish(
     caller: Caller,
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
-    find(&state, &caller, id).await?;
-    gone(state.context.store.delete_film(id).await?)
+    delete::<Fish>(&state, &caller, id).await
 }
 
 /// Download a file of a virtual fish.
@@ -168,11 +169,9 @@ pub(super) async fn get_fish_file(
     conditions: Conditions,
 ) -> Result<Response<Body>, Problem> {
     let (name, media_type) = find_file(FILES, &name)?;
-    let fish = find(&state, &caller, id).await?;
-    let label = match name {
-        "video.mp4" => format!("fish-{id}.mp4"),
-        _ => format!("fish-{id}.glb"),
-    };
+    let fish = find::<Fish>(&state, &caller, id).await?;
+    let extension = if name == "video.mp4" { "mp4" } else { "glb" };
+    let label = format!("fish-{id}.{extension}");
     let download = Download {
         folder: &fish.folder,
         name,
@@ -182,17 +181,14 @@ pub(super) async fn get_fish_file(
     download.answer(&state.context.store, &conditions).await
 }
 
-/// Returns a virtual fish. Fails with `not_ready` if its job is not done, and with `not_found` if there is
-/// none.
-async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Film, Problem> {
-    match state.context.store.fish(id, &caller.reach).await? {
-        Some(fish) => Ok(fish),
-        None => Err(absent_result(state, caller, id).await?),
-    }
-}
+impl View for FishView {
+    type Stored = Fish;
 
-impl FishView {
-    fn of(row: Film) -> Result<FishView, Problem> {
+    fn id(&self) -> Uuid {
+        self.id
+    }
+
+    fn from_row(row: FilmRow) -> Result<FishView, Problem> {
         Ok(FishView {
             id: row.id,
             job_id: row.job_id,

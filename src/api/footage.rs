@@ -15,12 +15,12 @@ use super::AppState;
 use super::access::Caller;
 use super::download::{Download, disposition};
 use super::extract::{Conditions, Id};
-use super::jobs::absent_result;
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody, gone};
+use super::problem::{Problem, ProblemBody};
 use super::receive::receive;
+use super::resources::{View, delete, find, get, list};
 use super::timestamp::rfc3339;
-use crate::jobs::admit::Arrival;
+use crate::jobs::admit::ReceivedFiles;
 use crate::jobs::{Error, admit};
 use crate::store::blobs::hex;
 use crate::store::footage::{Added, Footage, VIDEO};
@@ -101,20 +101,21 @@ pub(super) async fn create_footage(
     Query(naming): Query<Naming>,
     request: Request,
 ) -> Result<Response<Body>, Problem> {
-    let arrival = receive(&state, request, naming.name, caller.account.owner).await?;
-    let (status, footage) = match admit(&state, arrival).await? {
+    let received = receive(&state, request, naming.name, caller.account.owner).await?;
+    let (status, footage) = match admit(&state, received).await? {
         Added::New(footage) => (StatusCode::CREATED, footage),
         Added::Known(footage) => (StatusCode::OK, footage),
     };
     let location = [(header::LOCATION, format!("/v1/footage/{}", footage.id))];
-    Ok((status, location, axum::Json(FootageView::of(footage))).into_response())
+    let view = FootageView::from_row(footage)?;
+    Ok((status, location, axum::Json(view)).into_response())
 }
 
 /// Checks an upload and stores it as footage. It runs in its own task, so a client that disconnects cannot
 /// interrupt it halfway.
-pub(super) async fn admit(state: &AppState, arrival: Arrival) -> Result<Added, Problem> {
+pub(super) async fn admit(state: &AppState, received: ReceivedFiles) -> Result<Added, Problem> {
     let context = state.context.clone();
-    let admitted = tokio::spawn(async move { admit::admit(&context, arrival).await });
+    let admitted = tokio::spawn(async move { admit::admit(&context, received).await });
     Ok(admitted.await.unwrap_or(Err(Error::Panicked))?)
 }
 
@@ -128,11 +129,7 @@ pub(super) async fn list_footage(
     caller: Caller,
     paging: Paging,
 ) -> Result<axum::Json<Page<FootageView>>, Problem> {
-    let store = &state.context.store;
-    let rows = store
-        .list_footage(paging.limit + 1, paging.cursor, &caller.reach)
-        .await?;
-    Page::of(rows, paging, |row| row.id, |row| Ok(FootageView::of(row)))
+    list(&state, &caller, paging).await
 }
 
 /// Get one footage.
@@ -145,9 +142,7 @@ pub(super) async fn get_footage(
     caller: Caller,
     Id(id): Id,
 ) -> Result<axum::Json<FootageView>, Problem> {
-    Ok(axum::Json(FootageView::of(
-        find(&state, &caller, id).await?,
-    )))
+    get(&state, &caller, id).await
 }
 
 /// Delete footage and everything made from it.
@@ -162,8 +157,7 @@ pub(super) async fn delete_footage(
     caller: Caller,
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
-    find(&state, &caller, id).await?;
-    gone(state.context.store.delete_footage(id).await?)
+    delete::<Footage>(&state, &caller, id).await
 }
 
 /// Download the uploaded video.
@@ -181,7 +175,7 @@ pub(super) async fn get_footage_file(
     Id(id): Id,
     conditions: Conditions,
 ) -> Result<Response<Body>, Problem> {
-    let footage = find(&state, &caller, id).await?;
+    let footage = find::<Footage>(&state, &caller, id).await?;
     let label = match footage.name.as_str() {
         "" => "footage",
         name => name,
@@ -195,17 +189,15 @@ pub(super) async fn get_footage_file(
     download.answer(&state.context.store, &conditions).await
 }
 
-/// Returns footage. Fails with `not_ready` if its job is not done, and with `not_found` if there is none.
-pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Footage, Problem> {
-    match state.context.store.footage(id, &caller.reach).await? {
-        Some(footage) => Ok(footage),
-        None => Err(absent_result(state, caller, id).await?),
-    }
-}
+impl View for FootageView {
+    type Stored = Footage;
 
-impl FootageView {
-    fn of(footage: Footage) -> FootageView {
-        FootageView {
+    fn id(&self) -> Uuid {
+        self.id
+    }
+
+    fn from_row(footage: Footage) -> Result<FootageView, Problem> {
+        Ok(FootageView {
             id: footage.id,
             sha256: hex(&footage.sha256),
             name: footage.name,
@@ -217,6 +209,6 @@ impl FootageView {
             has_masks: !footage.masks_sha256.is_empty(),
             sample: footage.sample,
             created_at: rfc3339(footage.created_ms),
-        }
+        })
     }
 }

@@ -13,13 +13,13 @@ use super::AppState;
 use super::access::Caller;
 use super::download::{Download, Files, built, disposition, find as find_file};
 use super::extract::{Conditions, FileOf, Id};
-use super::jobs::absent_result;
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody, gone};
+use super::problem::{Problem, ProblemBody};
+use super::resources::{View, delete, find, get, list};
 use super::timestamp::rfc3339;
 use crate::jobs::analysis::Summary;
-use crate::jobs::{self, at_once};
-use crate::store::libraries::Library;
+use crate::jobs::{self, synchronous};
+use crate::store::resources::Library;
 
 const FILES: Files = &[
     ("library.json", "application/json"),
@@ -39,7 +39,7 @@ const FILES: Files = &[
 ];
 
 /// Name of the file that is not stored, but computed for each request.
-const NUMBERS: &str = "distance.npy";
+const DISTANCE_ARRAY: &str = "distance.npy";
 
 /// Summary of a library, the result of one analysis.
 #[derive(Debug, Serialize, ToSchema)]
@@ -74,11 +74,7 @@ pub(super) async fn list_libraries(
     caller: Caller,
     paging: Paging,
 ) -> Result<axum::Json<Page<LibraryView>>, Problem> {
-    let store = &state.context.store;
-    let rows = store
-        .list_libraries(paging.limit + 1, paging.cursor, &caller.reach)
-        .await?;
-    Page::of(rows, paging, |row| row.id, LibraryView::of)
+    list(&state, &caller, paging).await
 }
 
 /// Get one library: a summary, its parameters and advice.
@@ -93,9 +89,7 @@ pub(super) async fn get_library(
     caller: Caller,
     Id(id): Id,
 ) -> Result<axum::Json<LibraryView>, Problem> {
-    Ok(axum::Json(LibraryView::of(
-        find(&state, &caller, id).await?,
-    )?))
+    get(&state, &caller, id).await
 }
 
 /// Delete a library and everything made from it.
@@ -110,8 +104,7 @@ pub(super) async fn delete_library(
     caller: Caller,
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
-    find(&state, &caller, id).await?;
-    gone(state.context.store.delete_library(id).await?)
+    delete::<Library>(&state, &caller, id).await
 }
 
 /// Download a file of a library.
@@ -142,12 +135,12 @@ pub(super) async fn get_library_file(
     FileOf(id, name): FileOf,
     conditions: Conditions,
 ) -> Result<Response<Body>, Problem> {
-    if name == NUMBERS {
-        let library = find(&state, &caller, id).await?;
-        return numbers(&state, &library, &conditions).await;
+    if name == DISTANCE_ARRAY {
+        let library = find::<Library>(&state, &caller, id).await?;
+        return distance_array(&state, &library, &conditions).await;
     }
     let (name, media_type) = find_file(FILES, &name)?;
-    let library = find(&state, &caller, id).await?;
+    let library = find::<Library>(&state, &caller, id).await?;
     let download = Download {
         folder: &library.folder,
         name,
@@ -158,12 +151,12 @@ pub(super) async fn get_library_file(
 }
 
 /// Returns distance.npy. The library's files never change, so clients may cache the result forever.
-async fn numbers(
+async fn distance_array(
     state: &AppState,
     library: &Library,
     conditions: &Conditions,
 ) -> Result<Response<Body>, Problem> {
-    let etag = format!("\"{}-{NUMBERS}\"", library.id);
+    let etag = format!("\"{}-{DISTANCE_ARRAY}\"", library.id);
     let known = conditions.headers.get(header::IF_NONE_MATCH);
     let answer = Response::builder().header(header::ETAG, &etag).header(
         header::CACHE_CONTROL,
@@ -172,7 +165,7 @@ async fn numbers(
     if known.is_some_and(|known| known.as_bytes() == etag.as_bytes()) {
         return built(answer.status(StatusCode::NOT_MODIFIED).body(Body::empty()));
     }
-    let file = at_once::distances(&state.context, library).await?;
+    let file = synchronous::distance_file(&state.context, library).await?;
     let n_bytes = file.metadata().map_err(jobs::Error::Io)?.len();
     let file = ReaderStream::new(tokio::fs::File::from_std(file));
     built(
@@ -181,22 +174,20 @@ async fn numbers(
             .header(header::CONTENT_LENGTH, n_bytes)
             .header(
                 header::CONTENT_DISPOSITION,
-                disposition("attachment", NUMBERS),
+                disposition("attachment", DISTANCE_ARRAY),
             )
             .body(Body::from_stream(file)),
     )
 }
 
-/// Returns a library. Fails with `not_ready` if its job is not done, and with `not_found` if there is none.
-pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Library, Problem> {
-    match state.context.store.library(id, &caller.reach).await? {
-        Some(library) => Ok(library),
-        None => Err(absent_result(state, caller, id).await?),
-    }
-}
+impl View for LibraryView {
+    type Stored = Library;
 
-impl LibraryView {
-    fn of(row: Library) -> Result<LibraryView, Problem> {
+    fn id(&self) -> Uuid {
+        self.id
+    }
+
+    fn from_row(row: Library) -> Result<LibraryView, Problem> {
         Ok(LibraryView {
             id: row.id,
             job_id: row.job_id,

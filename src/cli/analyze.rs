@@ -130,8 +130,8 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let scratch = super::scratch_beside(&args.output);
     let background = background.as_ref();
     let refused = |error: jobs::Error| Error::work(error.code(), &error);
-    let given = (&*args.video, args.masks.as_deref());
-    let masks = Masks::open(&video, given, &limits, &hints).map_err(refused)?;
+    let given = args.masks.as_deref();
+    let masks = Masks::open(&video, &args.video, given, &limits, &hints).map_err(refused)?;
     let masked = masks.as_ref().map(|masks| masks.over(&video));
     let masked = masked.transpose().map_err(refused)?;
     let source: &dyn FrameSource = match &masked {
@@ -153,7 +153,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             .map_err(|error| Error::work(error.code(), &error))?;
     }
     super::say(&view_sentence(&library.poses));
-    let advice = Advice::all(&library, &params, video.notes());
+    let advice = Advice::for_library(&library, &params, video.notes());
     for Advice { code, sentence } in &advice {
         super::say(&format!("{sentence} ({code})"));
     }

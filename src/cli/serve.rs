@@ -122,7 +122,7 @@ pub(super) async fn wait_for_signal() -> Result<(), Error> {
 /// Converts an error of the store. A store that is in use, or belongs to another database, is a usage error.
 pub(super) fn from_store(error: store::Error) -> Error {
     match error {
-        store::Error::InUse(_) | store::Error::OtherFiles => Error::Usage(error.to_string()),
+        store::Error::InUse(_) | store::Error::ForeignFiles => Error::Usage(error.to_string()),
         _ => Error::work(error.code(), &error),
     }
 }

@@ -52,7 +52,7 @@ async fn work(args: Args) -> Result<(), Error> {
     let store = Store::open_beside(args.storage).await.map_err(from_store)?;
     let mut context = Context::new(store, threads);
     context.budget = Duration::from_secs(args.crew.job_time_s);
-    context.least_room_bytes = Config::least_room_bytes(Config::DISK_RESERVE_BYTES);
+    context.min_free_bytes = Config::least_room_bytes(Config::DISK_RESERVE_BYTES);
     recover(&context).await.map_err(from_store)?;
     let stop = Stop::default();
     if let Some(bind) = args.watch.metrics_bind {

@@ -34,7 +34,7 @@ impl Store {
                 faults.push(format!("I2: the folder has no row: {}", folder.name));
             }
         }
-        for (name, sql) in RULES_OF_JOBS {
+        for &(name, sql) in JOB_RULES {
             let broken = sql::query_scalar(sql).bind(now_ms);
             let jobs: Vec<Uuid> = broken.fetch_all(&self.reader).await?;
             faults.extend(jobs.into_iter().map(|job| format!("{name}: {job}")));
@@ -108,7 +108,7 @@ impl Store {
 
 /// Queries that return the job of each row that violates a rule. $1 is the time, milliseconds since 1970.
 /// Constraints of the table ensure that every job is in a legal state (I3).
-const RULES_OF_JOBS: &[(&str, &str)] = &[
+const JOB_RULES: &[(&str, &str)] = &[
     (
         "I4: a done job must have exactly one result with its fence, and any other job none",
         "select j.id from jobs j where $1 is not null and (case when j.state = 'done' then 1 else 0 end) != ( \

@@ -27,6 +27,7 @@ use crate::jobs::refusal::NAME;
 use crate::store::jobs::cancel::Cancel;
 use crate::store::jobs::read::JobRow;
 use crate::store::jobs::{JobState, Kind};
+use crate::store::resources::Library;
 
 /// A unit of queued work.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
@@ -108,9 +109,12 @@ pub(super) async fn list_jobs(
 ) -> Result<axum::Json<Page<JobView>>, Problem> {
     let store = &state.context.store;
     let rows = store
-        .list_jobs(paging.limit + 1, paging.cursor, &caller.reach)
+        .list_jobs(paging.n_rows(), paging.cursor, &caller.owners)
         .await?;
-    Page::of(rows, paging, |row| row.id.0, |row| Ok(JobView::of(row)))
+    let views = rows.into_iter().map(JobView::from).collect();
+    Ok(axum::Json(Page::new(views, paging, |view: &JobView| {
+        view.id.0
+    })))
 }
 
 /// Get one job.
@@ -127,13 +131,13 @@ pub(super) async fn get_job(
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
     let job = find(&state, &caller, JobId(id)).await?;
-    let Some(wait) = Wait::of(&headers) else {
+    let Some(wait) = Wait::from_headers(&headers) else {
         return Ok(axum::Json(job).into_response());
     };
-    let job = wait.for_end(&state, job.id).await?;
-    let job = job.map(JobView::of).ok_or_else(Problem::not_found)?;
+    let job = wait.until_ended(&state, job.id).await?;
+    let job = job.map(JobView::from).ok_or_else(Problem::not_found)?;
     let mut answer = axum::Json(job).into_response();
-    wait.applied(answer.headers_mut());
+    wait.mark_applied(answer.headers_mut());
     Ok(answer)
 }
 
@@ -151,7 +155,7 @@ pub(super) async fn get_refused_jpeg(
     Id(id): Id,
 ) -> Result<impl IntoResponse, Problem> {
     let store = &state.context.store;
-    let jpeg = store.refused_jpeg(JobId(id), &caller.reach).await?;
+    let jpeg = store.refused_jpeg(JobId(id), &caller.owners).await?;
     let jpeg = jpeg.ok_or_else(Problem::not_found)?;
     let headers = [
         (header::CONTENT_TYPE, "image/jpeg"),
@@ -180,7 +184,7 @@ pub(super) async fn cancel_job(
     let status = match state
         .context
         .store
-        .cancel(JobId(id), &caller.reach, now_ms())
+        .cancel(JobId(id), &caller.owners, now_ms())
         .await?
     {
         Cancel::Cancelled => StatusCode::OK,
@@ -193,8 +197,8 @@ pub(super) async fn cancel_job(
 }
 
 async fn find(state: &AppState, caller: &Caller, id: JobId) -> Result<JobView, Problem> {
-    let job = state.context.store.job(id, &caller.reach).await?;
-    job.map(JobView::of).ok_or_else(Problem::not_found)
+    let job = state.context.store.job(id, &caller.owners).await?;
+    job.map(JobView::from).ok_or_else(Problem::not_found)
 }
 
 /// Returns 202 with the address of the job in `Location` and that of its future result in `Link`.
@@ -214,7 +218,7 @@ pub(super) async fn absent_result(
     caller: &Caller,
     result: Uuid,
 ) -> Result<Problem, Problem> {
-    let job = state.context.store.job_of_result(result, &caller.reach);
+    let job = state.context.store.job_of_result(result, &caller.owners);
     let Some(job) = job.await? else {
         return Ok(Problem::not_found());
     };
@@ -234,11 +238,17 @@ pub(super) async fn job_to_follow(
     library_id: LibraryId,
 ) -> Result<Option<JobId>, Problem> {
     let store = &state.context.store;
-    if store.library(library_id.0, &caller.reach).await?.is_some() {
+    let library = store.resource::<Library>(library_id.0, &caller.owners);
+    if library.await?.is_some() {
         return Ok(None);
     }
-    match store.job_of_result(library_id.0, &caller.reach).await? {
-        Some(job) if job.kind == Kind::Analysis && !is_lost(job.state) => Ok(Some(job.id)),
+    match store.job_of_result(library_id.0, &caller.owners).await? {
+        Some(job)
+            if job.kind == Kind::Analysis
+                && !matches!(job.state, JobState::Failed | JobState::Cancelled) =>
+        {
+            Ok(Some(job.id))
+        }
         _ => {
             let sentence = format!("the library does not exist: {library_id}");
             Err(Problem::new(Code::InvalidParams, sentence))
@@ -247,63 +257,51 @@ pub(super) async fn job_to_follow(
 }
 
 /// Returns the address of a job's result, which may not exist yet.
-pub(super) fn result_of(row: &JobRow) -> String {
-    let noun = match row.kind {
-        Kind::Sample => "footage",
-        Kind::Analysis => "libraries",
-        Kind::Flock => "flocks",
-        Kind::Fish => "fish",
-    };
-    format!("/v1/{noun}/{}", row.result_id)
+pub(super) fn result_path(row: &JobRow) -> String {
+    format!("/v1/{}/{}", row.kind.result_kind().plural(), row.result_id)
 }
 
 /// Returns the footage or library that a job works on.
-fn subject_of(row: &JobRow) -> Option<JobSubject> {
+fn subject(row: &JobRow) -> Option<JobSubject> {
     let kind = match row.kind {
         Kind::Sample => return None,
         Kind::Analysis => "footage",
         Kind::Flock | Kind::Fish => "library",
     };
-    row.subject_id.map(|id| JobSubject { kind, id })
-}
-
-fn is_lost(state: JobState) -> bool {
-    matches!(state, JobState::Failed | JobState::Cancelled)
+    row.subject_id().map(|id| JobSubject { kind, id })
 }
 
 fn is_final(job: &JobView) -> bool {
     job.finished_at.is_some()
 }
 
-impl JobView {
-    fn of(row: JobRow) -> JobView {
-        let (result, subject) = (result_of(&row), subject_of(&row));
+impl From<JobRow> for JobView {
+    fn from(row: JobRow) -> JobView {
+        let path = format!("/v1/jobs/{}", row.id);
         JobView {
             id: row.id,
             kind: row.kind.name(),
             state: row.state.name(),
-            stage: row.stage,
             progress: row.progress,
             attempt: row.attempt,
             cancel_requested: row.cancel_requested,
-            error: row.failure.map(|(code, detail)| JobFailure {
-                picture: row
-                    .has_picture
-                    .then(|| format!("/v1/jobs/{}/{NAME}", row.id)),
-                code: code.name(),
-                title: code.meaning(),
-                detail,
-                advice: code.advice(),
+            error: row.failure().map(|failure| JobFailure {
+                picture: row.has_picture.then(|| format!("{path}/{NAME}")),
+                code: failure.code.name(),
+                title: failure.code.meaning(),
+                detail: failure.detail,
+                advice: failure.code.advice(),
             }),
             created_at: rfc3339(row.created_ms),
             started_at: row.started_ms.map(rfc3339),
             finished_at: row.finished_ms.map(rfc3339),
-            subject,
+            subject: subject(&row),
             links: JobLinks {
-                this: format!("/v1/jobs/{}", row.id),
-                events: format!("/v1/jobs/{}/events", row.id),
-                result,
+                events: format!("{path}/events"),
+                this: path,
+                result: result_path(&row),
             },
+            stage: row.stage,
         }
     }
 }

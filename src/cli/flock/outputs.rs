@@ -8,7 +8,8 @@ use serde_json::{Map, Value, json};
 use crate::cli::Error;
 use crate::cli::sample::parse_size;
 use crate::flock::composite::params::{Background, Format, Render};
-use crate::jobs::flock::film::{Backdrop, Output, Target};
+use crate::jobs::flock::film::Backdrop;
+use crate::jobs::flock::target::{Output, Target};
 use crate::media::{Limits, Video, read_image};
 use crate::raster::RgbImage;
 
@@ -56,7 +57,7 @@ pub(super) struct Outputs {
 /// Background of the film, with its file opened.
 pub(super) enum Behind {
     /// As the `render` parameters say.
-    AsAsked,
+    FromParams,
     /// A picture.
     Picture(RgbImage),
     /// A video.
@@ -113,7 +114,7 @@ impl Outputs {
     pub(super) fn behind(&self) -> Result<Behind, Error> {
         let named = self.named_background();
         let Some(path) = self.background.as_deref().filter(|_| named.is_none()) else {
-            return Ok(Behind::AsAsked);
+            return Ok(Behind::FromParams);
         };
         let path = Path::new(path);
         if !path.is_file() {
@@ -142,7 +143,7 @@ impl Behind {
     /// Returns the background in the type that `Film` takes.
     pub(super) fn backdrop(&self) -> Backdrop<'_> {
         match self {
-            Behind::AsAsked => Backdrop::AsAsked,
+            Behind::FromParams => Backdrop::FromParams,
             Behind::Picture(picture) => Backdrop::Picture(picture),
             Behind::Film(video) => Backdrop::Film(video.as_ref()),
         }

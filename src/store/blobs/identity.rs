@@ -2,25 +2,25 @@
 //! at their first use together. Without this check, a sweep with another database would find no rows for the
 //! files and delete them all.
 
-use super::{Place, hex};
+use super::{Backend, hex};
 use crate::store::tokens::random_key;
 use crate::store::{Error, Store, sql};
 
 impl Store {
-    /// Verifies that database and files have the same mark. Fails with [`Error::OtherFiles`] if they differ.
+    /// Verifies that database and files have the same mark. Fails with [`Error::ForeignFiles`] if they differ.
     ///
     /// A missing mark is added if the database knows at least one of the files, or if there are no files.
-    pub(in crate::store) async fn own_files(&self) -> Result<(), Error> {
+    pub(in crate::store) async fn check_identity(&self) -> Result<(), Error> {
         let of_rows = self.mark_of_rows().await?;
         let of_files = self.mark_of_files().await?;
         if let (Some(of_rows), Some(of_files)) = (&of_rows, &of_files) {
             return match hex(of_rows) == *of_files {
                 true => Ok(()),
-                false => Err(Error::OtherFiles),
+                false => Err(Error::ForeignFiles),
             };
         }
         if !self.knows_files().await? {
-            return Err(Error::OtherFiles);
+            return Err(Error::ForeignFiles);
         }
         let mark = match (of_rows, &of_files) {
             (Some(mark), _) => mark,
@@ -31,7 +31,7 @@ impl Store {
         match of_files {
             None => self.mark_files(&hex(&mark)).await,
             Some(of_files) if of_files == hex(&mark) => Ok(()),
-            Some(_) => Err(Error::OtherFiles),
+            Some(_) => Err(Error::ForeignFiles),
         }
     }
 
@@ -62,16 +62,16 @@ impl Store {
     }
 
     async fn mark_of_files(&self) -> Result<Option<String>, Error> {
-        match &self.blobs.place {
-            Place::Shelf(shelf) => Ok(shelf.mark()?),
-            Place::Bucket(bucket) => bucket.mark().await,
+        match &self.blobs.backend {
+            Backend::Local(local) => Ok(local.mark()?),
+            Backend::Bucket(bucket) => bucket.mark().await,
         }
     }
 
     async fn mark_files(&self, mark: &str) -> Result<(), Error> {
-        match &self.blobs.place {
-            Place::Shelf(shelf) => Ok(shelf.set_mark(mark)?),
-            Place::Bucket(bucket) => bucket.set_mark(mark).await,
+        match &self.blobs.backend {
+            Backend::Local(local) => Ok(local.set_mark(mark)?),
+            Backend::Bucket(bucket) => bucket.set_mark(mark).await,
         }
     }
 }
@@ -113,7 +113,7 @@ mod tests {
         let film = files.path().join("footage/a");
         fs::create_dir(&film).unwrap();
         let refused = open(other.path(), files.path()).await.unwrap_err();
-        assert!(matches!(refused, Error::OtherFiles), "{refused}");
+        assert!(matches!(refused, Error::ForeignFiles), "{refused}");
         assert!(film.is_dir());
         open(own.path(), files.path()).await.unwrap();
     }

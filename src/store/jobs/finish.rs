@@ -4,14 +4,15 @@
 use sqlx::types::Uuid;
 
 use super::{Change, Lease};
-use crate::store::footage::{self, Filmed};
-use crate::store::{BlobFile, Error, Store, Transaction, blobs, fish, flocks, libraries, sql};
+use crate::store::footage::{self, SampleFootage};
+use crate::store::resources::ResourceKind;
+use crate::store::{BlobFile, Error, Store, Transaction, blobs, sql};
 
 /// Output of a finished job: files that are already stored, and the values of the result's row.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// Kind of the result, and its source.
-    pub made: Made,
+    /// What the result was made from.
+    pub source: Source,
     /// Folder in the blob store.
     pub folder: String,
     /// Files in the folder.
@@ -22,17 +23,13 @@ pub struct Outcome {
     pub summary: String,
 }
 
-/// Kind of a result, with the id of the footage or library that it was made from.
+/// What a result was made from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Made {
-    /// The sample footage; made from nothing.
-    Sample(Filmed),
-    /// A library made from this footage.
-    Library(Uuid),
-    /// A flock made from this library.
-    Flock(Uuid),
-    /// A virtual fish made from this library.
-    Fish(Uuid),
+pub enum Source {
+    /// Nothing: the sample job filmed this footage.
+    Nothing(SampleFootage),
+    /// The footage or library with this id.
+    Resource(Uuid),
 }
 
 impl Store {
@@ -90,26 +87,33 @@ async fn insert(
     outcome: &Outcome,
     now_ms: i64,
 ) -> Result<(), Error> {
-    let (sql, made_of) = match outcome.made {
-        Made::Sample(filmed) => {
-            let film = (&filmed, outcome.folder.as_str(), &outcome.files[..]);
-            return footage::insert_filmed(transaction, lease, film, now_ms).await;
+    let source_id = match &outcome.source {
+        Source::Resource(id) => *id,
+        Source::Nothing(sample) => {
+            return footage::insert_sample(transaction, lease, outcome, sample, now_ms).await;
         }
-        Made::Library(footage_id) => (libraries::INSERT, footage_id),
-        Made::Flock(library_id) => (flocks::INSERT, library_id),
-        Made::Fish(library_id) => (fish::INSERT, library_id),
     };
-    sql::query(sql)
-        .bind(lease.result_id)
-        .bind(lease.job_id.0)
-        .bind(lease.fence)
-        .bind(made_of)
-        .bind(&outcome.folder)
-        .bind(&outcome.params)
-        .bind(&outcome.summary)
-        .bind(outcome.size_bytes())
-        .bind(now_ms)
-        .execute(transaction)
-        .await?;
+    let kind = lease.kind.result_kind();
+    let source_column = match kind {
+        ResourceKind::Library => "footage_id",
+        _ => "library_id",
+    };
+    sql::query(format!(
+        "insert into {} (id, job_id, fence, {source_column}, folder, params, summary, size_bytes, \
+         created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
+         (select owner from jobs where id = $2))",
+        kind.plural()
+    ))
+    .bind(lease.result_id)
+    .bind(lease.job_id.0)
+    .bind(lease.fence)
+    .bind(source_id)
+    .bind(&outcome.folder)
+    .bind(&outcome.params)
+    .bind(&outcome.summary)
+    .bind(outcome.size_bytes())
+    .bind(now_ms)
+    .execute(transaction)
+    .await?;
     Ok(())
 }

@@ -5,12 +5,13 @@ use tempfile::TempDir;
 
 use super::cancel::Cancel;
 use super::enqueue::NewJob;
-use super::finish::{Made, Outcome};
+use super::finish::{Outcome, Source};
 use super::heartbeat::Beat;
 use super::*;
 use crate::code::Code;
 use crate::store::Store;
-use crate::store::owners::{Account, Owner, Reach};
+use crate::store::owners::{Account, Owner, OwnerFilter};
+use crate::store::resources::Fish;
 use crate::store::{fresh, sql};
 
 const LEASE_MS: i64 = 15_000;
@@ -51,7 +52,7 @@ impl Queue {
             result_id: Uuid::now_v7(),
             after_job,
             priority,
-            room: 1_000,
+            max_queued: 1_000,
         };
         self.store.enqueue(&job, 0).await?;
         Ok(job_id)
@@ -64,7 +65,7 @@ impl Queue {
 
     async fn state(&self, job: JobId) -> JobState {
         self.store
-            .job(job, &Reach::All)
+            .job(job, &OwnerFilter::All)
             .await
             .unwrap()
             .unwrap()
@@ -75,7 +76,7 @@ impl Queue {
     async fn finish(&self, lease: &Lease) -> Change {
         let library = self.library().await;
         let outcome = Outcome {
-            made: Made::Fish(library),
+            source: Source::Resource(library),
             folder: format!("fish/{}.{}", lease.result_id, lease.fence),
             files: Vec::new(),
             params: "{}".into(),
@@ -144,7 +145,7 @@ async fn finishing_links_the_result_in_the_same_step() {
     assert_eq!(queue.state(job).await, JobState::Done);
     let fish = queue
         .store
-        .fish(lease.result_id, &Reach::All)
+        .resource::<Fish>(lease.result_id, &OwnerFilter::All)
         .await
         .unwrap()
         .unwrap();
@@ -191,9 +192,14 @@ async fn a_job_that_kills_its_worker_twice_is_quarantined() {
         queue.claim(0).await.unwrap();
         queue.store.rescue_all(1).await.unwrap();
     }
-    let row = queue.store.job(job, &Reach::All).await.unwrap().unwrap();
+    let row = queue
+        .store
+        .job(job, &OwnerFilter::All)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!(row.state, JobState::Failed);
-    assert_eq!(row.failure.unwrap().0, Code::CrashedWorker);
+    assert_eq!(row.failure().unwrap().code, Code::CrashedWorker);
     assert_eq!(queue.claim(i64::MAX - LEASE_MS).await, None);
 }
 
@@ -224,10 +230,18 @@ async fn a_queued_job_is_cancelled_at_once_with_what_follows_it() {
     let first = queue.enqueue(None).await;
     let second = queue.enqueue(Some(first)).await;
     let third = queue.enqueue(Some(second)).await;
-    let met = queue.store.cancel(first, &Reach::All, 1).await.unwrap();
+    let met = queue
+        .store
+        .cancel(first, &OwnerFilter::All, 1)
+        .await
+        .unwrap();
     assert_eq!(met, Cancel::Cancelled);
     assert_eq!(queue.state(third).await, JobState::Cancelled);
-    let met = queue.store.cancel(first, &Reach::All, 2).await.unwrap();
+    let met = queue
+        .store
+        .cancel(first, &OwnerFilter::All, 2)
+        .await
+        .unwrap();
     assert_eq!(met, Cancel::Final(JobState::Cancelled));
 }
 
@@ -237,7 +251,7 @@ async fn a_running_job_learns_of_its_cancelling_by_its_heartbeat() {
     let job = queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
     assert_eq!(
-        queue.store.cancel(job, &Reach::All, 1).await.unwrap(),
+        queue.store.cancel(job, &OwnerFilter::All, 1).await.unwrap(),
         Cancel::Requested
     );
     let beat = queue.store.heartbeat(&lease, 1, "", 0.0).await.unwrap();
@@ -252,7 +266,7 @@ async fn a_job_whose_worker_died_before_it_could_be_cancelled_is_cancelled() {
     let job = queue.enqueue(None).await;
     queue.claim(0).await.unwrap();
     assert_eq!(
-        queue.store.cancel(job, &Reach::All, 1).await.unwrap(),
+        queue.store.cancel(job, &OwnerFilter::All, 1).await.unwrap(),
         Cancel::Requested
     );
     queue.store.rescue_all(2).await.unwrap();
@@ -281,8 +295,13 @@ async fn a_job_that_follows_a_failed_one_fails_with_it() {
         .store
         .fail(&lease, Code::NothingMoves, "still", None, 1);
     assert_eq!(failed.await.unwrap(), Change::Made);
-    let row = queue.store.job(second, &Reach::All).await.unwrap().unwrap();
-    assert_eq!(row.failure.unwrap().0, Code::InputFailed);
+    let row = queue
+        .store
+        .job(second, &OwnerFilter::All)
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(row.failure().unwrap().code, Code::InputFailed);
 }
 
 #[tokio::test]

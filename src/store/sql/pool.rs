@@ -104,11 +104,11 @@ impl Pool {
         matches!(self, Pool::Sqlite(_))
     }
 
-    /// Copies a snapshot of the database to a file and opens the copy. Fails with [`Error::RowsElsewhere`] if
+    /// Copies a snapshot of the database to a file and opens the copy. Fails with [`Error::DatabaseOnServer`] if
     /// the database is on a server.
     pub(in crate::store) async fn copy_to(&self, file: &Path) -> Result<Pool, Error> {
         if !self.is_file() {
-            return Err(Error::RowsElsewhere);
+            return Err(Error::DatabaseOnServer);
         }
         query("vacuum into $1")
             .bind(file.to_string_lossy().into_owned())

@@ -179,7 +179,7 @@ mod tests {
         let n_runs = AtomicUsize::new(0);
         let work = || async {
             n_runs.fetch_add(1, Ordering::Relaxed);
-            Err::<(), _>(Error::RowsElsewhere)
+            Err::<(), _>(Error::DatabaseOnServer)
         };
         reserve.lend(work).await.unwrap_err();
         assert_eq!(n_runs.load(Ordering::Relaxed), 1);

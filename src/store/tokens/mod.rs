@@ -9,7 +9,7 @@ pub mod sessions;
 pub(super) use secret::random_key;
 use secret::{Presented, Secret};
 
-use super::owners::{Account, Owner, Reach};
+use super::owners::{Account, Owner, OwnerFilter};
 use super::{Error, Store, sql};
 
 /// Permissions of a token. Each scope includes the scopes before it.
@@ -159,10 +159,10 @@ impl Token {
     }
 
     /// Returns the owners whose rows the token may see.
-    pub fn reach(&self) -> Reach {
+    pub fn visible_owners(&self) -> OwnerFilter {
         match self.scope {
-            Scope::Admin => Reach::All,
-            Scope::Read | Scope::Write => Reach::Of(self.owner.clone()),
+            Scope::Admin => OwnerFilter::All,
+            Scope::Read | Scope::Write => OwnerFilter::One(self.owner.clone()),
         }
     }
 

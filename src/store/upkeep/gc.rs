@@ -26,8 +26,8 @@ impl Store {
     /// Counts the removable data. Changes nothing.
     pub async fn waste(&self, now: SystemTime, now_ms: i64) -> Result<Waste, Error> {
         let mut waste = Waste::default();
-        (waste.n_drafts, waste.n_bytes) = self.blobs.work().n_left()?;
-        for folder in self.old_strays(now).await? {
+        (waste.n_drafts, waste.n_bytes) = self.blobs.drafts().n_abandoned()?;
+        for folder in self.old_folders_without_row(now).await? {
             waste.n_folders += 1;
             waste.n_bytes += folder.n_bytes;
         }
@@ -95,7 +95,7 @@ mod tests {
     async fn what_nobody_refers_to_is_counted_and_then_removed() {
         let data = tempfile::tempdir().unwrap();
         let store = Store::open(data.path()).await.unwrap();
-        for folder in ["tmp/draft", "blobs/flocks/stray.1"] {
+        for folder in ["tmp/draft", "blobs/flocks/folder.1"] {
             fs::create_dir_all(data.path().join(folder)).unwrap();
             fs::write(data.path().join(folder).join("video"), b"12345").unwrap();
         }

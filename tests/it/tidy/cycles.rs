@@ -6,17 +6,15 @@ use std::path::Path;
 use super::reading::{assert_no, code_of, folders};
 
 /// Circles that still exist. Remove an entry with its circle; add none.
-const KNOWN: [&str; 12] = [
+const KNOWN: [&str; 10] = [
     "src/analysis/direction: energy, shape",
     "src/analysis/distance: group, page",
     "src/analysis/scene: light, plate",
     "src/analysis/scene: occupancy, samples, states, survey",
-    "src/api/access: auth, session",
     "src/fish: body, fins, mesh",
     "src/flock/boids/tank: floor, site",
     "src/flock/check: cost, graph, steps",
     "src/flock/plan/viterbi: column, half, meeting, walk",
-    "src/jobs/flock: film, sink, truth",
     "src/media/pictures: picture, stack",
     "src/media: gate, tools",
 ];

@@ -1,35 +1,33 @@
-//! Flocks: start the job that makes a flock, preview a flock, and read or delete flocks and their files.
+//! Flocks: their JSON, and reading and deleting them with their files. The other files of this folder queue,
+//! preview and share flocks.
+
+pub(super) mod create; // JSON or a form -> queued job
+pub(super) mod links; // signed links to files
+pub(super) mod preview; // flock.json without a video
 
 use axum::body::Body;
-use axum::extract::{FromRequest, Request, State};
-use axum::http::{Response, StatusCode, header};
-use axum::response::IntoResponse;
+use axum::extract::State;
+use axum::http::{Response, StatusCode};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
+use super::AppState;
 use super::access::Caller;
 use super::analyses::AnalysisOverrides;
 use super::download::{Download, Files, disposition, find as find_file};
-use super::extract::{Conditions, FileOf, Id, Json};
-use super::footage::admit;
-use super::jobs::{absent_result, accepted, job_to_follow};
+use super::extract::{Conditions, FileOf, Id};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody, gone};
-use super::receive::{is_film, receive_with};
+use super::problem::{Problem, ProblemBody};
+use super::resources::{View, delete, find, get, list};
 use super::timestamp::rfc3339;
-use super::{AppState, libraries};
-use crate::code::Code;
 use crate::flock::Params;
-use crate::formats::params;
-use crate::ids::{FlockId, FootageId, JobId, LibraryId};
-use crate::jobs::flock::{Input, Summary, enqueue};
-use crate::jobs::{analysis, at_once};
-use crate::store::flocks::Film;
-use crate::store::footage::Added;
+use crate::ids::{FlockId, JobId, LibraryId};
+use crate::jobs::flock::Summary;
+use crate::store::resources::{FilmRow, Flock};
 
-pub(super) const FILES: Files = &[
+const FILES: Files = &[
     ("flock.json", "application/json"),
     ("frames.zip", "application/zip"),
     ("ground-truth.zip", "application/zip"),
@@ -43,9 +41,6 @@ pub(super) const FILES: Files = &[
     ("video.webm", "video/webm"),
     ("video.mp4", "video/mp4"),
 ];
-
-/// Largest product of individuals and frames of a preview: about a second of computing.
-const MOST_PREVIEWED: u64 = 200_000;
 
 /// Library and parameters of a flock.
 ///
@@ -130,113 +125,6 @@ pub(super) struct FlockView {
     summary: Summary,
 }
 
-/// Start making a flock.
-///
-/// Queues a job that simulates, plans and films a flock. The body is JSON with the id of a library. If its
-/// analysis is still queued or running, the flock's job waits for it. The body may also be a form with a
-/// video: the video is stored and analyzed first.
-///
-/// The response is 202. `Location` is the address of the job, and `Link` that of the future flock. With
-/// `Prefer: wait=N`, a job that ends in time gives 201. An unknown library and wrong parameters fail with
-/// `invalid_params`. If too many jobs are queued or running, the call fails with `quota_exceeded` or
-/// `queue_full`.
-#[utoipa::path(post, path = "/v1/flocks",
-    request_body(content((FlockRequest = "application/json"), (FlockForm = "multipart/form-data"))), responses(
-    (status = 202, body = FlockAccepted, headers(("location" = String), ("link" = String))),
-    (status = 201, body = FlockAccepted, headers(("location" = String)), description = "done within the requested wait"),
-    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
-    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
-))]
-pub(super) async fn create_flock(
-    State(state): State<AppState>,
-    caller: Caller,
-    request: Request,
-) -> Result<Response<Body>, Problem> {
-    if is_film(&request) {
-        return create_flock_of_film(&state, &caller, request).await;
-    }
-    let Json(request) = Json::<FlockRequest>::from_request(request, &state).await?;
-    let params: Params = params::read(request.params)?;
-    let library_id = request.library_id;
-    let after_job = job_to_follow(&state, &caller, library_id).await?;
-    make(&state, &caller, (library_id, after_job), params).await
-}
-
-/// Stores a video, queues its analysis, and queues the flock after that.
-async fn create_flock_of_film(
-    state: &AppState,
-    caller: &Caller,
-    request: Request,
-) -> Result<Response<Body>, Problem> {
-    let (label, wishes) = ((None, caller.account.owner.clone()), ["params", "analysis"]);
-    let (arrival, mut wishes) = receive_with(state, request, label, &wishes).await?;
-    let params = params::read(wishes.remove("params").unwrap_or_default())?;
-    let analysis = params::read(wishes.remove("analysis").unwrap_or_default())?;
-    let (Added::New(footage) | Added::Known(footage)) = admit(state, arrival).await?;
-    let input = analysis::Input {
-        footage_id: FootageId(footage.id),
-        params: analysis,
-    };
-    let queued = analysis::enqueue(&state.context, &input, None, &caller.account);
-    let (job_id, library_id) = queued.await?;
-    make(state, caller, (library_id, Some(job_id)), params).await
-}
-
-/// Queues a flock and returns 202. If `after_job` is given, the flock waits for that job.
-async fn make(
-    state: &AppState,
-    caller: &Caller,
-    (library_id, after_job): (LibraryId, Option<JobId>),
-    params: Params,
-) -> Result<Response<Body>, Problem> {
-    let input = Input { library_id, params };
-    let (job_id, flock_id) = enqueue(&state.context, &input, after_job, &caller.account).await?;
-    let result = format!("/v1/flocks/{flock_id}");
-    Ok(accepted(
-        job_id,
-        &result,
-        FlockAccepted {
-            job_id,
-            flock_id,
-            library_id,
-        },
-    ))
-}
-
-/// Preview a flock without a video.
-///
-/// Simulates and plans a flock while the client waits. The response is its `flock.json`. Nothing is stored.
-/// The library must exist.
-///
-/// The number of individuals (20 if `count` is null) times `frames` is at most 200,000, else the call fails
-/// with `invalid_params`. Previews run one at a time. A preview that cannot start within 20 seconds fails
-/// with `busy`.
-#[utoipa::path(post, path = "/v1/flocks/preview", request_body = FlockRequest, responses(
-    (status = 200, content_type = "application/json", body = Value),
-    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
-    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
-))]
-pub(super) async fn preview_flock(
-    State(state): State<AppState>,
-    caller: Caller,
-    Json(request): Json<FlockRequest>,
-) -> Result<Response<Body>, Problem> {
-    let params: Params = params::read(request.params)?;
-    let n_shown = u64::from(params.most_individuals()) * u64::from(params.frames);
-    if n_shown > MOST_PREVIEWED {
-        return Err(Problem {
-            code: Code::InvalidParams,
-            detail: format!(
-                "count times frames of a preview must be at most {MOST_PREVIEWED}, not {n_shown}: make a flock instead"
-            ),
-        });
-    }
-    let library = libraries::find(&state, &caller, request.library_id.0).await?;
-    let flock = at_once::flock(&state.context, &library, params).await?;
-    let json = [(header::CONTENT_TYPE, "application/json")];
-    Ok((json, flock).into_response())
-}
-
 /// List all flocks, newest first.
 #[utoipa::path(get, path = "/v1/flocks", params(Paging), responses(
     (status = 200, body = Page<FlockView>),
@@ -247,11 +135,7 @@ pub(super) async fn list_flocks(
     caller: Caller,
     paging: Paging,
 ) -> Result<axum::Json<Page<FlockView>>, Problem> {
-    let store = &state.context.store;
-    let rows = store
-        .list_flocks(paging.limit + 1, paging.cursor, &caller.reach)
-        .await?;
-    Page::of(rows, paging, |row| row.id, FlockView::of)
+    list(&state, &caller, paging).await
 }
 
 /// Get one flock: a summary, its parameters and advice.
@@ -266,7 +150,7 @@ pub(super) async fn get_flock(
     caller: Caller,
     Id(id): Id,
 ) -> Result<axum::Json<FlockView>, Problem> {
-    Ok(axum::Json(FlockView::of(find(&state, &caller, id).await?)?))
+    get(&state, &caller, id).await
 }
 
 /// Delete a flock and its job.
@@ -279,8 +163,7 @@ pub(super) async fn delete_flock(
     caller: Caller,
     Id(id): Id,
 ) -> Result<StatusCode, Problem> {
-    find(&state, &caller, id).await?;
-    gone(state.context.store.delete_film(id).await?)
+    delete::<Flock>(&state, &caller, id).await
 }
 
 /// Download a file of a flock.
@@ -308,7 +191,7 @@ pub(super) async fn get_flock_file(
     conditions: Conditions,
 ) -> Result<Response<Body>, Problem> {
     let (name, media_type) = find_file(FILES, &name)?;
-    let flock = find(&state, &caller, id).await?;
+    let flock = find::<Flock>(&state, &caller, id).await?;
     // A browser cannot show these, so it saves them.
     let kind = match media_type {
         "application/zip" | "video/quicktime" => "attachment",
@@ -318,13 +201,13 @@ pub(super) async fn get_flock_file(
         folder: &flock.folder,
         name,
         media_type,
-        disposition: disposition(kind, &label_of(name, id)),
+        disposition: disposition(kind, &saved_name(name, id)),
     };
     download.answer(&state.context.store, &conditions).await
 }
 
 /// Returns the name under which a browser saves the file.
-fn label_of(name: &str, id: Uuid) -> String {
+fn saved_name(name: &str, id: Uuid) -> String {
     match name {
         "flock.json" => format!("flock-{id}.json"),
         _ => match name.strip_prefix("video.") {
@@ -334,16 +217,14 @@ fn label_of(name: &str, id: Uuid) -> String {
     }
 }
 
-/// Returns a flock. Fails with `not_ready` if its job is not done, and with `not_found` if there is none.
-pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Film, Problem> {
-    match state.context.store.flock(id, &caller.reach).await? {
-        Some(flock) => Ok(flock),
-        None => Err(absent_result(state, caller, id).await?),
-    }
-}
+impl View for FlockView {
+    type Stored = Flock;
 
-impl FlockView {
-    fn of(row: Film) -> Result<FlockView, Problem> {
+    fn id(&self) -> Uuid {
+        self.id
+    }
+
+    fn from_row(row: FilmRow) -> Result<FlockView, Problem> {
         Ok(FlockView {
             id: row.id,
             job_id: row.job_id,
