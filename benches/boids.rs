@@ -46,7 +46,7 @@ fn time(count: u32, steps: u32, n_threads: usize) -> f64 {
     let side = (f64::from(count) * AREA_PER_BOID_BL2).sqrt();
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [side, side, 0.0]));
     timing::on_threads(n_threads, || {
-        let mut boids = Boids::at_random(&params, &calibration, (&lens, &tank), 30.0);
+        let mut boids = Boids::at_random(&params, &calibration, &lens, &tank, 30.0);
         let seconds = timing::fastest_s(3, || (0..steps).for_each(|_| boids.advance()));
         seconds / f64::from(steps)
     })

@@ -2,26 +2,23 @@
 //!
 //! The request names stored footage, or its body is the video itself, which is then stored first.
 
-use axum::body::Body;
-use axum::extract::{FromRequest, Query, Request, State};
-use axum::http::Response;
+use axum::extract::{FromRequest, Query, Request};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
-use super::AppState;
-use super::access::Caller;
-use super::extract::Json;
+use super::extract::{Access, Json};
 use super::footage::{Naming, admit};
 use super::jobs::accepted;
-use super::problem::{Problem, ProblemBody};
-use super::receive::{is_film, receive_with};
+use super::problem::{Answer, Problem, ProblemBody};
+use super::receive::{Form, is_film, receive_with_json};
 use crate::analysis::Params;
 use crate::code::Code;
 use crate::formats::params;
 use crate::ids::{FootageId, JobId, LibraryId};
-use crate::jobs::analysis::{Input, enqueue};
-use crate::store::footage::Added;
+use crate::jobs::IdSequence;
+use crate::jobs::analysis::Input;
+use crate::store::footage::{Added, Footage};
 
 /// Footage to measure, and parameters of the analysis.
 #[derive(Debug, Deserialize, ToSchema)]
@@ -99,46 +96,45 @@ pub(super) struct AnalysisForm {
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn create_analysis(
-    State(state): State<AppState>,
+    access: Access,
     Query(naming): Query<Naming>,
-    caller: Caller,
+    mut ids: IdSequence,
     request: Request,
-) -> Result<Response<Body>, Problem> {
-    if is_film(&request) {
-        let label = (naming.name, caller.account.owner.clone());
-        let (arrival, mut wishes) = receive_with(&state, request, label, &["params"]).await?;
-        let params = params::read(wishes.remove("params").unwrap_or_default())?;
-        let (Added::New(footage) | Added::Known(footage)) = admit(&state, arrival).await?;
-        return measure(&state, &caller, FootageId(footage.id), params).await;
-    }
-    let Json(request) = Json::<AnalysisRequest>::from_request(request, &state).await?;
-    let params: Params = params::read(request.params)?;
-    let footage_id = request.footage_id;
-    let footage = state.context.store.footage(footage_id.0, &caller.reach);
-    if footage.await?.is_none() {
-        let sentence = format!("the footage does not exist: {footage_id}");
-        return Err(Problem::new(Code::InvalidParams, sentence));
-    }
-    measure(&state, &caller, footage_id, params).await
-}
-
-/// Queues the analysis and returns 202.
-async fn measure(
-    state: &AppState,
-    caller: &Caller,
-    footage_id: FootageId,
-    params: Params,
-) -> Result<Response<Body>, Problem> {
-    let input = Input { footage_id, params };
-    let (job_id, library_id) = enqueue(&state.context, &input, None, &caller.account).await?;
-    let result = format!("/v1/libraries/{library_id}");
+) -> Answer {
+    let input = if is_film(&request) {
+        let form = Form {
+            name: naming.name,
+            owner: access.caller.account.owner.clone(),
+            json_fields: &["params"],
+        };
+        let (received, mut fields) = receive_with_json(&access.state, request, form).await?;
+        let params = params::read(fields.remove("params").unwrap_or_default())?;
+        let (Added::New(footage) | Added::Known(footage)) = admit(&access.state, received).await?;
+        Input {
+            footage_id: FootageId(footage.id),
+            params,
+        }
+    } else {
+        let Json(request) = Json::<AnalysisRequest>::from_request(request, &access.state).await?;
+        let params: Params = params::read(request.params)?;
+        let footage_id = request.footage_id;
+        let owners = &access.caller.owners;
+        let footage = access.store().resource::<Footage>(footage_id.0, owners);
+        if footage.await?.is_none() {
+            let sentence = format!("the footage does not exist: {footage_id}");
+            return Err(Problem::new(Code::InvalidParams, sentence));
+        }
+        Input { footage_id, params }
+    };
+    let (job_id, library_id) = access.enqueue(&input, None, &mut ids).await?;
+    let body = AnalysisAccepted {
+        job_id,
+        library_id,
+        footage_id: input.footage_id,
+    };
     Ok(accepted(
         job_id,
-        &result,
-        AnalysisAccepted {
-            job_id,
-            library_id,
-            footage_id,
-        },
+        &format!("/v1/libraries/{library_id}"),
+        body,
     ))
 }

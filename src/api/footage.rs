@@ -3,24 +3,22 @@
 //! A refused upload leaves no files. The original video is sent only as an attachment, so a browser never
 //! interprets it (docs/explanation/promises.md, "Nothing served runs as a page").
 
-use axum::body::Body;
-use axum::extract::{Query, Request, State};
-use axum::http::{Response, StatusCode, header};
+use axum::extract::{Query, Request};
+use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
 use super::AppState;
-use super::access::Caller;
 use super::download::{Download, disposition};
-use super::extract::{Conditions, Id};
-use super::jobs::absent_result;
+use super::extract::{Access, Conditions, Id};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody, gone};
+use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::receive::receive;
+use super::resources::View;
 use super::timestamp::rfc3339;
-use crate::jobs::admit::Arrival;
+use crate::jobs::admit::ReceivedFiles;
 use crate::jobs::{Error, admit};
 use crate::store::blobs::hex;
 use crate::store::footage::{Added, Footage, VIDEO};
@@ -96,25 +94,31 @@ pub(super) struct FootageForm {
         (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
     ))]
 pub(super) async fn create_footage(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     Query(naming): Query<Naming>,
     request: Request,
-) -> Result<Response<Body>, Problem> {
-    let arrival = receive(&state, request, naming.name, caller.account.owner).await?;
-    let (status, footage) = match admit(&state, arrival).await? {
+) -> Answer {
+    let received = receive(
+        &access.state,
+        request,
+        naming.name,
+        access.caller.account.owner,
+    )
+    .await?;
+    let (status, footage) = match admit(&access.state, received).await? {
         Added::New(footage) => (StatusCode::CREATED, footage),
         Added::Known(footage) => (StatusCode::OK, footage),
     };
     let location = [(header::LOCATION, format!("/v1/footage/{}", footage.id))];
-    Ok((status, location, axum::Json(FootageView::of(footage))).into_response())
+    let view = FootageView::from_row(footage)?;
+    Ok((status, location, axum::Json(view)).into_response())
 }
 
 /// Checks an upload and stores it as footage. It runs in its own task, so a client that disconnects cannot
 /// interrupt it halfway.
-pub(super) async fn admit(state: &AppState, arrival: Arrival) -> Result<Added, Problem> {
+pub(super) async fn admit(state: &AppState, received: ReceivedFiles) -> Result<Added, Problem> {
     let context = state.context.clone();
-    let admitted = tokio::spawn(async move { admit::admit(&context, arrival).await });
+    let admitted = tokio::spawn(async move { admit::admit(&context, received).await });
     Ok(admitted.await.unwrap_or(Err(Error::Panicked))?)
 }
 
@@ -123,16 +127,8 @@ pub(super) async fn admit(state: &AppState, arrival: Arrival) -> Result<Added, P
     (status = 200, body = Page<FootageView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn list_footage(
-    State(state): State<AppState>,
-    caller: Caller,
-    paging: Paging,
-) -> Result<axum::Json<Page<FootageView>>, Problem> {
-    let store = &state.context.store;
-    let rows = store
-        .list_footage(paging.limit + 1, paging.cursor, &caller.reach)
-        .await?;
-    Page::of(rows, paging, |row| row.id, |row| Ok(FootageView::of(row)))
+pub(super) async fn list_footage(access: Access, paging: Paging) -> JsonAnswer<Page<FootageView>> {
+    access.list(paging).await
 }
 
 /// Get one footage.
@@ -140,14 +136,8 @@ pub(super) async fn list_footage(
     (status = 200, body = FootageView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn get_footage(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<axum::Json<FootageView>, Problem> {
-    Ok(axum::Json(FootageView::of(
-        find(&state, &caller, id).await?,
-    )))
+pub(super) async fn get_footage(access: Access, Id(id): Id) -> JsonAnswer<FootageView> {
+    access.get(id).await
 }
 
 /// Delete footage and everything made from it.
@@ -157,13 +147,8 @@ pub(super) async fn get_footage(
     (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn delete_footage(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<StatusCode, Problem> {
-    find(&state, &caller, id).await?;
-    gone(state.context.store.delete_footage(id).await?)
+pub(super) async fn delete_footage(access: Access, Id(id): Id) -> Result<StatusCode, Problem> {
+    access.delete::<Footage>(id).await
 }
 
 /// Download the uploaded video.
@@ -175,13 +160,8 @@ pub(super) async fn delete_footage(
     (status = 304, description = "not modified"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn get_footage_file(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-    conditions: Conditions,
-) -> Result<Response<Body>, Problem> {
-    let footage = find(&state, &caller, id).await?;
+pub(super) async fn get_footage_file(access: Access, Id(id): Id, conditions: Conditions) -> Answer {
+    let footage = access.find::<Footage>(id).await?;
     let label = match footage.name.as_str() {
         "" => "footage",
         name => name,
@@ -192,20 +172,18 @@ pub(super) async fn get_footage_file(
         media_type: "application/octet-stream",
         disposition: disposition("attachment", label),
     };
-    download.answer(&state.context.store, &conditions).await
+    download.answer(access.store(), &conditions).await
 }
 
-/// Returns footage. Fails with `not_ready` if its job is not done, and with `not_found` if there is none.
-pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Footage, Problem> {
-    match state.context.store.footage(id, &caller.reach).await? {
-        Some(footage) => Ok(footage),
-        None => Err(absent_result(state, caller, id).await?),
+impl View for FootageView {
+    type Stored = Footage;
+
+    fn id(&self) -> Uuid {
+        self.id
     }
-}
 
-impl FootageView {
-    fn of(footage: Footage) -> FootageView {
-        FootageView {
+    fn from_row(footage: Footage) -> Result<FootageView, Problem> {
+        Ok(FootageView {
             id: footage.id,
             sha256: hex(&footage.sha256),
             name: footage.name,
@@ -217,6 +195,6 @@ impl FootageView {
             has_masks: !footage.masks_sha256.is_empty(),
             sample: footage.sample,
             created_at: rfc3339(footage.created_ms),
-        }
+        })
     }
 }

@@ -1,7 +1,6 @@
 //! Libraries: the results of analyses, with their pictures and files.
 
 use axum::body::Body;
-use axum::extract::State;
 use axum::http::{Response, StatusCode, header};
 use serde::Serialize;
 use serde_json::Value;
@@ -10,16 +9,15 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::AppState;
-use super::access::Caller;
 use super::download::{Download, Files, built, disposition, find as find_file};
-use super::extract::{Conditions, FileOf, Id};
-use super::jobs::absent_result;
+use super::extract::{Access, Conditions, FileOf, Id};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody, gone};
+use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
+use super::resources::View;
 use super::timestamp::rfc3339;
 use crate::jobs::analysis::Summary;
-use crate::jobs::{self, at_once};
-use crate::store::libraries::Library;
+use crate::jobs::{self, synchronous};
+use crate::store::resources::Library;
 
 const FILES: Files = &[
     ("library.json", "application/json"),
@@ -39,7 +37,7 @@ const FILES: Files = &[
 ];
 
 /// Name of the file that is not stored, but computed for each request.
-const NUMBERS: &str = "distance.npy";
+const DISTANCE_ARRAY: &str = "distance.npy";
 
 /// Summary of a library, the result of one analysis.
 #[derive(Debug, Serialize, ToSchema)]
@@ -70,15 +68,10 @@ pub(super) struct LibraryView {
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn list_libraries(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     paging: Paging,
-) -> Result<axum::Json<Page<LibraryView>>, Problem> {
-    let store = &state.context.store;
-    let rows = store
-        .list_libraries(paging.limit + 1, paging.cursor, &caller.reach)
-        .await?;
-    Page::of(rows, paging, |row| row.id, LibraryView::of)
+) -> JsonAnswer<Page<LibraryView>> {
+    access.list(paging).await
 }
 
 /// Get one library: a summary, its parameters and advice.
@@ -88,14 +81,8 @@ pub(super) async fn list_libraries(
     (status = 200, body = LibraryView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn get_library(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<axum::Json<LibraryView>, Problem> {
-    Ok(axum::Json(LibraryView::of(
-        find(&state, &caller, id).await?,
-    )?))
+pub(super) async fn get_library(access: Access, Id(id): Id) -> JsonAnswer<LibraryView> {
+    access.get(id).await
 }
 
 /// Delete a library and everything made from it.
@@ -105,13 +92,8 @@ pub(super) async fn get_library(
     (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn delete_library(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<StatusCode, Problem> {
-    find(&state, &caller, id).await?;
-    gone(state.context.store.delete_library(id).await?)
+pub(super) async fn delete_library(access: Access, Id(id): Id) -> Result<StatusCode, Problem> {
+    access.delete::<Library>(id).await
 }
 
 /// Download a file of a library.
@@ -137,33 +119,28 @@ pub(super) async fn delete_library(
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_library_file(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     FileOf(id, name): FileOf,
     conditions: Conditions,
-) -> Result<Response<Body>, Problem> {
-    if name == NUMBERS {
-        let library = find(&state, &caller, id).await?;
-        return numbers(&state, &library, &conditions).await;
+) -> Answer {
+    if name == DISTANCE_ARRAY {
+        let library = access.find::<Library>(id).await?;
+        return distance_array(&access.state, &library, &conditions).await;
     }
     let (name, media_type) = find_file(FILES, &name)?;
-    let library = find(&state, &caller, id).await?;
+    let library = access.find::<Library>(id).await?;
     let download = Download {
         folder: &library.folder,
         name,
         media_type,
         disposition: disposition("inline", name),
     };
-    download.answer(&state.context.store, &conditions).await
+    download.answer(access.store(), &conditions).await
 }
 
 /// Returns distance.npy. The library's files never change, so clients may cache the result forever.
-async fn numbers(
-    state: &AppState,
-    library: &Library,
-    conditions: &Conditions,
-) -> Result<Response<Body>, Problem> {
-    let etag = format!("\"{}-{NUMBERS}\"", library.id);
+async fn distance_array(state: &AppState, library: &Library, conditions: &Conditions) -> Answer {
+    let etag = format!("\"{}-{DISTANCE_ARRAY}\"", library.id);
     let known = conditions.headers.get(header::IF_NONE_MATCH);
     let answer = Response::builder().header(header::ETAG, &etag).header(
         header::CACHE_CONTROL,
@@ -172,7 +149,7 @@ async fn numbers(
     if known.is_some_and(|known| known.as_bytes() == etag.as_bytes()) {
         return built(answer.status(StatusCode::NOT_MODIFIED).body(Body::empty()));
     }
-    let file = at_once::distances(&state.context, library).await?;
+    let file = synchronous::distance_file(&state.context, library).await?;
     let n_bytes = file.metadata().map_err(jobs::Error::Io)?.len();
     let file = ReaderStream::new(tokio::fs::File::from_std(file));
     built(
@@ -181,22 +158,20 @@ async fn numbers(
             .header(header::CONTENT_LENGTH, n_bytes)
             .header(
                 header::CONTENT_DISPOSITION,
-                disposition("attachment", NUMBERS),
+                disposition("attachment", DISTANCE_ARRAY),
             )
             .body(Body::from_stream(file)),
     )
 }
 
-/// Returns a library. Fails with `not_ready` if its job is not done, and with `not_found` if there is none.
-pub(super) async fn find(state: &AppState, caller: &Caller, id: Uuid) -> Result<Library, Problem> {
-    match state.context.store.library(id, &caller.reach).await? {
-        Some(library) => Ok(library),
-        None => Err(absent_result(state, caller, id).await?),
-    }
-}
+impl View for LibraryView {
+    type Stored = Library;
 
-impl LibraryView {
-    fn of(row: Library) -> Result<LibraryView, Problem> {
+    fn id(&self) -> Uuid {
+        self.id
+    }
+
+    fn from_row(row: Library) -> Result<LibraryView, Problem> {
         Ok(LibraryView {
             id: row.id,
             job_id: row.job_id,

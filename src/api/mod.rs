@@ -13,6 +13,7 @@ mod download;
 mod extract; // ids, JSON bodies, conditional headers
 mod paging;
 mod receive; // request bodies to disk
+mod resources; // what footage, libraries, flocks and fish have in common
 mod timestamp;
 
 mod analyses;
@@ -21,9 +22,8 @@ mod flocks;
 mod footage;
 mod jobs;
 mod libraries;
-mod links;
+mod monitoring; // health, metrics, request ids
 mod page; // the web page, /docs, /openapi.json
-mod seen; // health, metrics, request ids
 mod uploads;
 
 use std::ops::Deref;
@@ -41,14 +41,15 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 pub use access::signed;
+pub use monitoring::metrics::{metrics_router, worker_metrics_router};
 pub use problem::Problem;
-pub use seen::metrics::{metrics_router, worker_metrics_router};
 
-use access::{Names, Rates, authenticate, guard, session};
+use access::{HostNames, Rates, authenticate, guard, session};
+use monitoring::metrics::Metrics;
+use monitoring::observe::{Requests, observe};
+use monitoring::{health, metrics};
 use page::{docs, openapi};
-use seen::metrics::Metrics;
-use seen::observe::{Requests, observe};
-use seen::{health, metrics};
+use receive::CHUNK_TIMEOUT;
 
 use crate::code::Code;
 use crate::config::Config;
@@ -59,8 +60,6 @@ use crate::{media, store};
 
 /// Largest JSON body, bytes. Free choice.
 const MAX_JSON_BYTES: usize = 1 << 20;
-/// Longest wait for the next chunk of a body (docs/explanation/promises.md, "Slow clients"). Free choice.
-const BODY_PIECE: Duration = Duration::from_secs(30);
 
 /// State shared by all handlers. Every layer clones it for every request, so it is only a reference-counted
 /// pointer.
@@ -99,7 +98,7 @@ impl AppState {
         let mut context = Context::new(store, config.jobs.threads_per_worker());
         context.budget = Duration::from_secs(config.jobs.job_time_s);
         context.max_queued = config.max_queued;
-        context.least_room_bytes = Config::job_reserve_bytes(config.disk_reserve_bytes);
+        context.min_free_bytes = Config::job_reserve_bytes(config.disk_reserve_bytes);
         recover(&context).await?;
         let tool = tokio::task::spawn_blocking(media::sandbox_status).await;
         let tool = tool.map_err(std::io::Error::other)?;
@@ -125,9 +124,10 @@ pub fn router(state: AppState) -> Router {
     openapi::add_headers(&mut document);
     openapi::join_flattened(&mut document);
     let requests = state.requests.clone();
-    let names = match state.config.requires_tokens() {
-        true => Names::Any,
-        false => Names::Loopback,
+    let names = if state.config.requires_tokens() {
+        HostNames::Any
+    } else {
+        HostNames::Loopback
     };
     routes
         .merge(openapi::route(&document))
@@ -144,11 +144,11 @@ pub fn router(state: AppState) -> Router {
             state.clone(),
             jobs::wait::wait_for_result,
         ))
-        .layer(middleware::from_fn(uploads::speak_tus))
+        .layer(middleware::from_fn(uploads::tus_version))
         .layer(middleware::from_fn_with_state(state.clone(), authenticate))
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
-        .layer(RequestBodyTimeoutLayer::new(BODY_PIECE))
-        .layer(CatchPanicLayer::custom(panicked))
+        .layer(RequestBodyTimeoutLayer::new(CHUNK_TIMEOUT))
+        .layer(CatchPanicLayer::custom(panic_response))
         .layer(middleware::from_fn_with_state(state, refuse_while_stopping))
         .layer(middleware::from_fn_with_state(names, guard))
         .layer(middleware::from_fn_with_state(requests, observe))
@@ -170,11 +170,11 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(libraries::list_libraries))
         .routes(routes!(libraries::get_library, libraries::delete_library))
         .routes(routes!(libraries::get_library_file))
-        .routes(routes!(flocks::create_flock, flocks::list_flocks))
-        .routes(routes!(flocks::preview_flock))
+        .routes(routes!(flocks::create::create_flock, flocks::list_flocks))
+        .routes(routes!(flocks::preview::preview_flock))
         .routes(routes!(flocks::get_flock, flocks::delete_flock))
         .routes(routes!(flocks::get_flock_file))
-        .routes(routes!(links::create_flock_link))
+        .routes(routes!(flocks::links::create_flock_link))
         .routes(routes!(fish::create_fish, fish::list_fish))
         .routes(routes!(fish::get_fish, fish::delete_fish))
         .routes(routes!(fish::get_fish_file))
@@ -196,13 +196,13 @@ async fn refuse_while_stopping(
     request: Request,
     next: Next,
 ) -> Response {
-    match state.context.draining.is_cancelled() && !request.method().is_safe() {
-        true => Problem::from(Code::Stopping).into_response(),
-        false => next.run(request).await,
+    if state.context.draining.is_cancelled() && !request.method().is_safe() {
+        return Problem::from(Code::Stopping).into_response();
     }
+    next.run(request).await
 }
 
-fn panicked(_: Box<dyn std::any::Any + Send>) -> Response {
+fn panic_response(_: Box<dyn std::any::Any + Send>) -> Response {
     tracing::error!("a handler panicked");
     Problem::from(Code::Internal).into_response()
 }

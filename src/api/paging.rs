@@ -21,7 +21,7 @@ const MAX_LIMIT: i64 = 200;
 #[into_params(parameter_in = Query)]
 pub(super) struct Paging {
     /// Maximum number of items, 1..=200.
-    #[serde(default = "fifty")]
+    #[serde(default = "default_limit")]
     #[param(minimum = 1, maximum = 200, default = 50)]
     pub limit: i64,
     /// `next_cursor` of the previous page. Without it the first page is returned.
@@ -37,21 +37,21 @@ pub(super) struct Page<T> {
     pub next_cursor: Option<Uuid>,
 }
 
+impl Paging {
+    /// Returns the number of rows to query: one more than fit on the page, to see whether there is a next page.
+    pub(super) fn n_rows(self) -> i64 {
+        self.limit + 1
+    }
+}
+
 impl<T> Page<T> {
-    /// Returns a page of `rows`, which must be queried with a limit of `limit` + 1: the extra row shows that
-    /// there is a next page.
-    pub(super) fn of<Row>(
-        mut rows: Vec<Row>,
-        paging: Paging,
-        id_of: impl Fn(&Row) -> Uuid,
-        view: impl Fn(Row) -> Result<T, Problem>,
-    ) -> Result<axum::Json<Page<T>>, Problem> {
+    /// Returns a page of `items`, queried with a limit of [`Paging::n_rows`].
+    pub(super) fn new(mut items: Vec<T>, paging: Paging, id: impl Fn(&T) -> Uuid) -> Page<T> {
         let limit = usize::try_from(paging.limit).unwrap_or(0);
-        let has_more = rows.len() > limit;
-        rows.truncate(limit);
-        let next_cursor = rows.last().filter(|_| has_more).map(id_of);
-        let items = rows.into_iter().map(view).collect::<Result<_, _>>()?;
-        Ok(axum::Json(Page { items, next_cursor }))
+        let has_more = items.len() > limit;
+        items.truncate(limit);
+        let next_cursor = items.last().filter(|_| has_more).map(id);
+        Page { items, next_cursor }
     }
 }
 
@@ -72,6 +72,6 @@ impl<S: Send + Sync> FromRequestParts<S> for Paging {
     }
 }
 
-fn fifty() -> i64 {
+fn default_limit() -> i64 {
     50
 }

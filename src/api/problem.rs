@@ -9,6 +9,12 @@ use crate::code::Code;
 use crate::formats::params;
 use crate::{jobs, store};
 
+/// Result of a handler.
+pub(super) type Answer = Result<Response, Problem>;
+
+/// Result of a handler that responds with JSON.
+pub(super) type JsonAnswer<T> = Result<axum::Json<T>, Problem>;
+
 /// Value of `Retry-After`, seconds. Free choice.
 const RETRY_AFTER_S: u64 = 5;
 
@@ -24,7 +30,7 @@ pub struct Problem {
 /// Marks a response with a transient error: retrying may succeed. It is an extension of the response that
 /// `idempotency` reads.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct MayPass;
+pub(super) struct Transient;
 
 /// Body of every error response (RFC 9457).
 #[derive(Serialize, ToSchema)]
@@ -55,25 +61,17 @@ impl Problem {
 
     /// Returns whether retrying the same request may succeed: after a server error, or if a media tool hit
     /// its limits, which may be due to a busy machine.
-    pub(super) fn may_pass(&self) -> bool {
-        let is_of_the_moment = matches!(
+    pub(super) fn is_transient(&self) -> bool {
+        let is_tool_limit = matches!(
             self.code,
             Code::TimeLimit | Code::MemoryLimit | Code::DecoderCrashed
         );
-        is_of_the_moment || !status_of(self.code).is_client_error()
+        is_tool_limit || !status_of(self.code).is_client_error()
     }
 
     /// Returns `not_found`. An id of another owner gets the same response as an unknown id.
     pub fn not_found() -> Problem {
         Code::NotFound.into()
-    }
-}
-
-/// Returns the response to a DELETE: 204, or `not_found` if nothing was deleted.
-pub(super) fn gone(was_there: bool) -> Result<StatusCode, Problem> {
-    match was_there {
-        true => Ok(StatusCode::NO_CONTENT),
-        false => Err(Problem::not_found()),
     }
 }
 
@@ -119,7 +117,7 @@ fn from_error(code: Code, error: &dyn std::error::Error) -> Problem {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let status = status_of(self.code);
-        let may_pass = self.may_pass();
+        let is_transient = self.is_transient();
         let body = ProblemBody {
             type_url: format!("/docs/errors#{}", self.code),
             title: self.code.meaning(),
@@ -149,8 +147,8 @@ impl IntoResponse for Problem {
             let challenge = HeaderValue::from_static("Bearer realm=\"flockreel\"");
             headers.insert(header::WWW_AUTHENTICATE, challenge);
         }
-        if may_pass {
-            response.extensions_mut().insert(MayPass);
+        if is_transient {
+            response.extensions_mut().insert(Transient);
         }
         response
     }

@@ -16,37 +16,39 @@ use tokio::time::timeout;
 use uuid::Uuid;
 
 use super::AppState;
-use super::access::Caller;
-use super::extract::Id;
-use super::problem::{Problem, ProblemBody};
-use super::receive::{CHECK_EVERY_BYTES, PIECE, check_room, label, of_broken_body};
+use super::extract::{Access, Id};
+use super::problem::{Answer, Problem, ProblemBody};
+use super::receive::{
+    CHECK_EVERY_BYTES, CHUNK_TIMEOUT, check_free_space, code_of_broken_body, label,
+};
 use crate::code::Code;
-use crate::jobs::admit::Arrival;
-use crate::jobs::allotted::next_id;
+use crate::jobs::IdSequence;
+use crate::jobs::admit::ReceivedFiles;
 use crate::jobs::clock::now_ms;
 use crate::store::footage::Added;
-use crate::store::owners::Reach;
-use crate::store::uploads::{Hold, LIFE_MS, Upload};
+use crate::store::owners::OwnerFilter;
+use crate::store::uploads::{LIFETIME_MS, Upload, UploadLock};
 
 const VERSION: HeaderValue = HeaderValue::from_static("1.0.0");
 const RESUMABLE: HeaderName = HeaderName::from_static("tus-resumable");
 const OFFSET: HeaderName = HeaderName::from_static("upload-offset");
 const LENGTH: HeaderName = HeaderName::from_static("upload-length");
-const PIECE_TYPE: &str = "application/offset+octet-stream";
+const CHUNK_MEDIA_TYPE: &str = "application/offset+octet-stream";
 /// Bytes between two syncs, the most that a crash loses. A request with a checksum is synced only at its end.
-const SAFE_EVERY: i64 = CHECK_EVERY_BYTES as i64;
+const SYNC_EVERY_BYTES: i64 = CHECK_EVERY_BYTES as i64;
 
 /// Middleware: adds the tus version to responses below /v1/uploads, and refuses requests of other versions.
-pub(super) async fn speak_tus(request: Request, next: Next) -> Response<Body> {
+pub(super) async fn tus_version(request: Request, next: Next) -> Response<Body> {
     let path = request.uri().path();
     if path != "/v1/uploads" && !path.starts_with("/v1/uploads/") {
         return next.run(request).await;
     }
     let version = request.headers().get(RESUMABLE);
     let is_known = request.method() == "OPTIONS" || version == Some(&VERSION);
-    let mut answer = match is_known {
-        true => next.run(request).await,
-        false => Problem::from(Code::TusVersionNotSupported).into_response(),
+    let mut answer = if is_known {
+        next.run(request).await
+    } else {
+        Problem::from(Code::TusVersionNotSupported).into_response()
     };
     let headers = answer.headers_mut();
     headers.insert(RESUMABLE, VERSION);
@@ -78,42 +80,39 @@ pub(super) async fn describe_uploads(State(state): State<AppState>) -> Response<
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn create_upload(
-    State(state): State<AppState>,
-    caller: Caller,
-    request: Request,
-) -> Result<Response<Body>, Problem> {
+pub(super) async fn create_upload(access: Access, mut ids: IdSequence, request: Request) -> Answer {
     let headers = request.headers();
     let size_bytes = number(headers, &LENGTH)?;
-    let limit_bytes = state.config.max_upload_bytes;
+    let limit_bytes = access.state.config.max_upload_bytes;
     if size_bytes.unsigned_abs() > limit_bytes {
         return Err(crate::store::Error::TooLarge { limit_bytes }.into());
     }
-    check_room(&state, size_bytes.unsigned_abs())?;
+    check_free_space(&access.state, size_bytes.unsigned_abs())?;
     let upload = Upload {
-        id: next_id(),
-        owner: caller.account.owner,
+        id: ids.next_id(),
+        owner: access.caller.account.owner.clone(),
         name: label(&file_name(headers)?),
         size_bytes,
         offset_bytes: 0,
         footage_id: None,
-        expires_ms: now_ms() + LIFE_MS,
+        expires_ms: now_ms() + LIFETIME_MS,
     };
-    let store = &state.context.store;
+    let store = access.store();
     store.sweep_uploads(now_ms()).await?;
     let location = [(header::LOCATION, format!("/v1/uploads/{}", upload.id))];
-    let hold = store.hold_upload(upload.id).await;
+    let lock = store.lock_upload(upload.id).await;
     // A request repeated after a crash gets the same id from its Idempotency-Key, and finds its upload.
-    let reach = Reach::Of(upload.owner.clone());
-    if let Some(upload) = store.upload(upload.id, &reach, now_ms()).await? {
-        return Ok((StatusCode::CREATED, location, standing(&upload)).into_response());
+    let owners = OwnerFilter::One(upload.owner.clone());
+    if let Some(upload) = store.upload(upload.id, &owners, now_ms()).await? {
+        return Ok((StatusCode::CREATED, location, status_headers(&upload)).into_response());
     }
     store.create_upload(&upload).await?;
-    let upload = match is_piece(headers) {
-        true => take(&state, &hold, upload, request).await?,
-        false => upload,
+    let upload = if is_chunk(headers) {
+        receive_chunk(&access.state, &lock, upload, request).await?
+    } else {
+        upload
     };
-    Ok((StatusCode::CREATED, location, standing(&upload)).into_response())
+    Ok((StatusCode::CREATED, location, status_headers(&upload)).into_response())
 }
 
 /// Get the state of an upload. Send the next bytes from `Upload-Offset` on.
@@ -121,18 +120,14 @@ pub(super) async fn create_upload(
     (status = 200, headers(("upload-offset" = i64), ("upload-length" = i64), ("upload-expires" = String))),
     (status = "4XX", description = "an error; a response to HEAD has no body"),
 ))]
-pub(super) async fn head_upload(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<Response<Body>, Problem> {
-    find(&state, &caller.reach, id).await?;
-    let hold = state.context.store.hold_upload(id).await;
-    let upload = find(&state, &caller.reach, id).await?;
+pub(super) async fn head_upload(access: Access, Id(id): Id) -> Answer {
+    find(&access, id).await?;
+    let lock = access.store().lock_upload(id).await;
+    let upload = find(&access, id).await?;
     // The process may have ended after the last byte, before the upload became footage.
-    let upload = end_if_whole(&state, upload).await?;
-    drop(hold);
-    Ok((StatusCode::OK, standing(&upload)).into_response())
+    let upload = finish_if_complete(&access.state, upload).await?;
+    drop(lock);
+    Ok((StatusCode::OK, status_headers(&upload)).into_response())
 }
 
 /// Send the next bytes of an upload.
@@ -147,26 +142,21 @@ pub(super) async fn head_upload(
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn patch_upload(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-    request: Request,
-) -> Result<Response<Body>, Problem> {
-    if !is_piece(request.headers()) {
-        let sentence = format!("the Content-Type of an upload part must be {PIECE_TYPE}");
+pub(super) async fn patch_upload(access: Access, Id(id): Id, request: Request) -> Answer {
+    if !is_chunk(request.headers()) {
+        let sentence = format!("the Content-Type of an upload part must be {CHUNK_MEDIA_TYPE}");
         return Err(Problem::new(Code::UnsupportedMediaType, sentence));
     }
     let offset_bytes = number(request.headers(), &OFFSET)?;
-    find(&state, &caller.reach, id).await?;
-    let hold = state.context.store.hold_upload(id).await;
-    let upload = find(&state, &caller.reach, id).await?;
+    find(&access, id).await?;
+    let lock = access.store().lock_upload(id).await;
+    let upload = find(&access, id).await?;
     if offset_bytes != upload.offset_bytes {
         let sentence = format!("the stored offset is {} bytes", upload.offset_bytes);
         return Err(Problem::new(Code::OffsetDiffers, sentence));
     }
-    let upload = take(&state, &hold, upload, request).await?;
-    Ok((StatusCode::NO_CONTENT, standing(&upload)).into_response())
+    let upload = receive_chunk(&access.state, &lock, upload, request).await?;
+    Ok((StatusCode::NO_CONTENT, status_headers(&upload)).into_response())
 }
 
 /// Cancel an upload and delete its bytes. Footage that it has become is kept.
@@ -174,91 +164,88 @@ pub(super) async fn patch_upload(
     (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn delete_upload(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<StatusCode, Problem> {
-    find(&state, &caller.reach, id).await?;
-    let _hold = state.context.store.hold_upload(id).await;
-    find(&state, &caller.reach, id).await?;
-    state.context.store.delete_upload(id).await?;
+pub(super) async fn delete_upload(access: Access, Id(id): Id) -> Result<StatusCode, Problem> {
+    find(&access, id).await?;
+    let _lock = access.store().lock_upload(id).await;
+    find(&access, id).await?;
+    access.store().delete_upload(id).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
-async fn find(state: &AppState, reach: &Reach, id: Uuid) -> Result<Upload, Problem> {
-    let upload = state.context.store.upload(id, reach, now_ms()).await?;
+async fn find(access: &Access, id: Uuid) -> Result<Upload, Problem> {
+    let owners = &access.caller.owners;
+    let upload = access.store().upload(id, owners, now_ms()).await?;
     upload.ok_or_else(Problem::not_found)
 }
 
 /// Appends the body of a request to an upload, and turns a complete upload into footage. If the body is cut
 /// off, the bytes received so far are kept, unless the request has a checksum.
-async fn take(
+async fn receive_chunk(
     state: &AppState,
-    hold: &Hold,
+    lock: &UploadLock,
     mut upload: Upload,
     request: Request,
 ) -> Result<Upload, Problem> {
     let store = &state.context.store;
-    let mut checksum = Checksum::of(request.headers())?;
+    let mut checksum = Checksum::from_headers(request.headers())?;
     let mut body = request.into_body().into_data_stream();
     if upload.footage_id.is_some() {
         return Ok(upload);
     }
-    let mut growing = store.grow_upload(&upload).await?;
-    let mut came_bytes = upload.offset_bytes;
+    let mut file = store.open_upload_file(&upload).await?;
+    let mut received_bytes = upload.offset_bytes;
     let ended = loop {
-        let piece = match next_piece(&mut body, hold).await {
-            Ok(Some(piece)) => piece,
+        let bytes = match next_bytes(&mut body, lock).await {
+            Ok(Some(bytes)) => bytes,
             Ok(None) => break Ok(()),
             Err(problem) => break Err(problem),
         };
-        came_bytes += piece.len() as i64;
-        if came_bytes > upload.size_bytes {
-            came_bytes -= piece.len() as i64;
+        received_bytes += bytes.len() as i64;
+        if received_bytes > upload.size_bytes {
+            received_bytes -= bytes.len() as i64;
             break Err(Code::TooLarge.into());
         }
         // Other requests fill the disk too, so the free space is checked again from time to time.
-        let before = came_bytes - piece.len() as i64;
-        if before / SAFE_EVERY != came_bytes / SAFE_EVERY
-            && let Err(problem) = check_room(state, 0)
+        let before = received_bytes - bytes.len() as i64;
+        if before / SYNC_EVERY_BYTES != received_bytes / SYNC_EVERY_BYTES
+            && let Err(problem) = check_free_space(state, 0)
         {
-            came_bytes = before;
+            received_bytes = before;
             break Err(problem);
         }
-        growing.add(&piece).await?;
+        file.append(&bytes).await?;
         if let Some(checksum) = &mut checksum {
-            checksum.update(&piece);
-        } else if came_bytes - upload.offset_bytes >= SAFE_EVERY {
-            growing.sync().await?;
-            upload.offset_bytes = came_bytes;
-            store.note_upload(&upload).await?;
+            checksum.update(&bytes);
+        } else if received_bytes - upload.offset_bytes >= SYNC_EVERY_BYTES {
+            file.sync().await?;
+            upload.offset_bytes = received_bytes;
+            store.record_upload_offset(&upload).await?;
         }
     };
     if let Some(checksum) = checksum {
         ended.clone()?;
         checksum.verify()?;
     }
-    growing.sync().await?;
-    upload.offset_bytes = came_bytes;
-    upload.expires_ms = now_ms() + LIFE_MS;
-    store.note_upload(&upload).await?;
+    file.sync().await?;
+    upload.offset_bytes = received_bytes;
+    upload.expires_ms = now_ms() + LIFETIME_MS;
+    store.record_upload_offset(&upload).await?;
     ended?;
-    end_if_whole(state, upload).await
+    finish_if_complete(state, upload).await
 }
 
-async fn next_piece(
+async fn next_bytes(
     body: &mut BodyDataStream,
-    hold: &Hold,
+    lock: &UploadLock,
 ) -> Result<Option<bytes::Bytes>, Problem> {
     let next = tokio::select! {
-        next = timeout(PIECE, body.next()) => next,
-        () = hold.wanted.cancelled() => return Err(Code::OffsetDiffers.into()),
+        next = timeout(CHUNK_TIMEOUT, body.next()) => next,
+        () = lock.requested.cancelled() => return Err(Code::OffsetDiffers.into()),
     };
     match next {
-        Ok(piece) => piece.transpose().map_err(|error| {
+        Ok(bytes) => bytes.transpose().map_err(|error| {
             tracing::debug!(%error, "an upload was cut off");
-            of_broken_body(&error).into()
+            code_of_broken_body(&error).into()
         }),
         Err(_) => Err(Code::BodyTimeout.into()),
     }
@@ -266,13 +253,13 @@ async fn next_piece(
 
 /// Turns a complete upload into footage. An incomplete one is returned unchanged. If the video is refused,
 /// the upload is deleted; after a transient error it is kept.
-async fn end_if_whole(state: &AppState, mut upload: Upload) -> Result<Upload, Problem> {
+async fn finish_if_complete(state: &AppState, mut upload: Upload) -> Result<Upload, Problem> {
     if upload.offset_bytes < upload.size_bytes || upload.footage_id.is_some() {
         return Ok(upload);
     }
     let store = &state.context.store;
     let (draft, video) = store.draft_of_upload(&upload).await?;
-    let arrival = Arrival {
+    let received = ReceivedFiles {
         draft,
         video,
         background: None,
@@ -280,13 +267,13 @@ async fn end_if_whole(state: &AppState, mut upload: Upload) -> Result<Upload, Pr
         name: upload.name.clone(),
         owner: upload.owner.clone(),
     };
-    match super::footage::admit(state, arrival).await {
+    match super::footage::admit(state, received).await {
         Ok(Added::New(footage) | Added::Known(footage)) => {
-            store.end_upload(&upload, footage.id).await?;
+            store.finish_upload(&upload, footage.id).await?;
             upload.footage_id = Some(footage.id);
             Ok(upload)
         }
-        Err(problem) if !problem.may_pass() => {
+        Err(problem) if !problem.is_transient() => {
             store.delete_upload(upload.id).await?;
             Err(problem)
         }
@@ -295,7 +282,7 @@ async fn end_if_whole(state: &AppState, mut upload: Upload) -> Result<Upload, Pr
 }
 
 /// Returns the state of an upload as headers: offset, length, expiry, and the footage in `Link`.
-fn standing(upload: &Upload) -> HeaderMap {
+fn status_headers(upload: &Upload) -> HeaderMap {
     let expires = super::timestamp::http_date(upload.expires_ms);
     let link = upload
         .footage_id
@@ -340,15 +327,15 @@ fn file_name(headers: &HeaderMap) -> Result<String, Problem> {
     Ok(String::new())
 }
 
-fn is_piece(headers: &HeaderMap) -> bool {
+fn is_chunk(headers: &HeaderMap) -> bool {
     let media_type = headers.get(header::CONTENT_TYPE);
-    media_type.is_some_and(|value| value.as_bytes() == PIECE_TYPE.as_bytes())
+    media_type.is_some_and(|value| value.as_bytes() == CHUNK_MEDIA_TYPE.as_bytes())
 }
 
 /// Expected hash of the body of one request.
 struct Checksum {
     hasher: Hasher,
-    wanted: Vec<u8>,
+    expected: Vec<u8>,
 }
 
 enum Hasher {
@@ -357,7 +344,7 @@ enum Hasher {
 }
 
 impl Checksum {
-    fn of(headers: &HeaderMap) -> Result<Option<Checksum>, Problem> {
+    fn from_headers(headers: &HeaderMap) -> Result<Option<Checksum>, Problem> {
         let Some(line) = headers.get("upload-checksum") else {
             return Ok(None);
         };
@@ -371,10 +358,10 @@ impl Checksum {
             "sha256" => Hasher::Sha256(Sha256::new()),
             _ => return Err(malformed()),
         };
-        let wanted = STANDARD
+        let expected = STANDARD
             .decode(value.trim())
             .map_err(|_not_base64| malformed())?;
-        Ok(Some(Checksum { hasher, wanted }))
+        Ok(Some(Checksum { hasher, expected }))
     }
 
     fn update(&mut self, bytes: &[u8]) {
@@ -389,9 +376,10 @@ impl Checksum {
             Hasher::Sha1(hasher) => hasher.finalize().to_vec(),
             Hasher::Sha256(hasher) => hasher.finalize().to_vec(),
         };
-        match found == self.wanted {
-            true => Ok(()),
-            false => Err(Code::ChecksumMismatch.into()),
+        if found == self.expected {
+            Ok(())
+        } else {
+            Err(Code::ChecksumMismatch.into())
         }
     }
 }

@@ -106,9 +106,10 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let level = cpu::Level::detect();
     let scratch = super::scratch_beside(&args.output);
     let background = background.as_ref();
-    let given = (&*args.video, args.masks.as_deref());
-    let masks = Masks::open(&video, given, &limits, &options)?;
-    let masked = masks.as_ref().map(|masks| masks.over(&video)).transpose()?;
+    let given = args.masks.as_deref();
+    let masks = Masks::open(&video, &args.video, given, &limits, &options)?;
+    let masked = masks.as_ref().map(|masks| masks.over(&video));
+    let masked = masked.transpose()?;
     let source: &dyn FrameSource = match &masked {
         Some(masked) => masked,
         None => &video,
@@ -127,7 +128,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         overlay::film(&part, &library.poses, path, &progress)?;
     }
     super::say(&view_sentence(&library.poses));
-    let advice = Advice::all(&library, &params, video.notices());
+    let advice = Advice::for_library(&library, &params, video.notices());
     for Advice { code, sentence } in &advice {
         super::say(&format!("{sentence} ({code})"));
     }
@@ -141,7 +142,7 @@ fn show_refusal(film: &dyn FrameSource, error: &analysis::Error, output: &Path) 
         return;
     };
     let name = output.file_name().unwrap_or_default().to_string_lossy();
-    let path = output.with_file_name(format!("{name}.{}", refusal::NAME));
+    let path = output.with_file_name(format!("{name}.{}", refusal::FILE_NAME));
     let folder = output.parent().unwrap_or(Path::new(""));
     let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, picture));
     match written {

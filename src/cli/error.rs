@@ -100,7 +100,7 @@ impl From<fish::Error> for Error {
 impl From<store::Error> for Error {
     fn from(error: store::Error) -> Error {
         match error {
-            store::Error::InUse(_) | store::Error::OtherFiles => Error::Usage(error.to_string()),
+            store::Error::InUse(_) | store::Error::ForeignFiles => Error::Usage(error.to_string()),
             _ => Error::work(error.code(), &error),
         }
     }

@@ -50,7 +50,7 @@ async fn work(args: Args) -> Result<(), Error> {
     let store = Store::open_beside(args.storage).await?;
     let mut context = Context::new(store, threads);
     context.budget = Duration::from_secs(args.jobs.job_time_s);
-    context.least_room_bytes = Config::job_reserve_bytes(Config::DISK_RESERVE_BYTES);
+    context.min_free_bytes = Config::job_reserve_bytes(Config::DISK_RESERVE_BYTES);
     recover(&context).await?;
     let stop = Stop::default();
     if let Some(bind) = args.monitoring.metrics_bind {

@@ -13,7 +13,7 @@ use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
 
 /// Files received into a draft, synced and hashed, with their label and owner.
-pub struct Arrival {
+pub struct ReceivedFiles {
     /// The draft that holds the files.
     pub draft: Draft,
     /// The video.
@@ -29,39 +29,45 @@ pub struct Arrival {
 }
 
 /// Checks the files and stores them. Returns the existing footage if the owner has already stored the same
-/// files. Waits for a permit of `places`; fails with [`Error::Busy`] if none becomes free.
-pub async fn admit(context: &Context, arrival: Arrival) -> Result<Added, Error> {
-    let place = context.places.take().await?;
-    let (arrival, format) = tokio::task::spawn_blocking(move || {
-        let _place = place;
-        let format = inspect(&arrival)?;
-        Ok::<_, Error>((arrival, format))
+/// files. Waits for a permit of `upload_checks`; fails with [`Error::Busy`] if none becomes free.
+pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, Error> {
+    let permit = context.upload_checks.acquire().await?;
+    let (received, format) = tokio::task::spawn_blocking(move || {
+        let _permit = permit;
+        let format = inspect(&received)?;
+        Ok::<_, Error>((received, format))
     })
     .await
     .unwrap_or(Err(Error::Panicked))?;
-    let footage = row(&arrival, &format);
-    let mut files = vec![arrival.video];
-    files.extend(arrival.background);
-    files.extend(arrival.masks);
+    let footage = footage_row(&received, &format);
+    let mut files = vec![received.video];
+    files.extend(received.background);
+    files.extend(received.masks);
     let store = &context.store;
-    Ok(store.add_footage(footage, arrival.draft, &files).await?)
+    Ok(store.add_footage(footage, received.draft, &files).await?)
 }
 
 /// Checks the files without decoding the video. Returns the properties of the video.
-fn inspect(arrival: &Arrival) -> Result<FootageFormat, Error> {
+fn inspect(received: &ReceivedFiles) -> Result<FootageFormat, Error> {
     let limits = Limits::default();
-    let path = arrival.draft.path().join(VIDEO);
+    let path = received.draft.path().join(VIDEO);
     let video = Video::open(&path, &limits)?;
     let format = video.format();
-    if arrival.masks.is_some() {
-        let given = arrival.draft.path().join(MASKS);
-        let given = (&*path, Some(&*given));
-        if let Some(masks) = Masks::open(&video, given, &limits, &ReadOptions::default())? {
+    if received.masks.is_some() {
+        let given = received.draft.path().join(MASKS);
+        let masks = Masks::open(
+            &video,
+            &path,
+            Some(&given),
+            &limits,
+            &ReadOptions::default(),
+        )?;
+        if let Some(masks) = masks {
             masks.over(&video)?;
         }
     }
-    if arrival.background.is_some() {
-        let image = read_image(&arrival.draft.path().join(BACKGROUND), &limits)?;
+    if received.background.is_some() {
+        let image = read_image(&received.draft.path().join(BACKGROUND), &limits)?;
         let (found, wanted) = ([image.width, image.height], [format.width, format.height]);
         if found != wanted {
             return Err(crate::analysis::Error::BackgroundSizeDiffers { found, wanted }.into());
@@ -70,20 +76,20 @@ fn inspect(arrival: &Arrival) -> Result<FootageFormat, Error> {
     Ok(format)
 }
 
-fn row(arrival: &Arrival, format: &FootageFormat) -> Footage {
-    let background = arrival.background.as_ref();
+fn footage_row(received: &ReceivedFiles, format: &FootageFormat) -> Footage {
+    let background = received.background.as_ref();
     let size_bytes = |file: Option<&BlobFile>| file.map_or(0, |file| file.size_bytes);
     let sha256 = |file: Option<&BlobFile>| file.map_or(Vec::new(), |file| file.sha256.clone());
-    let masks = arrival.masks.as_ref();
+    let masks = received.masks.as_ref();
     Footage {
         id: Uuid::now_v7(),
-        owner: arrival.owner.clone(),
+        owner: received.owner.clone(),
         folder: String::new(),
-        sha256: arrival.video.sha256.clone(),
+        sha256: received.video.sha256.clone(),
         background_sha256: sha256(background),
         masks_sha256: sha256(masks),
-        name: arrival.name.clone(),
-        size_bytes: arrival.video.size_bytes + size_bytes(background) + size_bytes(masks),
+        name: received.name.clone(),
+        size_bytes: received.video.size_bytes + size_bytes(background) + size_bytes(masks),
         width: i64::from(format.width),
         height: i64::from(format.height),
         fps: format.fps,
@@ -98,10 +104,10 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::jobs::places::Places;
+    use crate::jobs::ConcurrencyLimit;
 
     #[tokio::test]
-    async fn a_film_waits_for_a_place_before_anybody_looks_at_it() {
+    async fn an_upload_is_refused_as_busy_if_no_check_can_start() {
         let data = tempfile::tempdir().unwrap();
         let store = crate::store::Store::open(data.path()).await.unwrap();
         let draft = store.blobs().draft("film").unwrap();
@@ -111,8 +117,8 @@ mod tests {
             sha256: Vec::new(),
         };
         let mut context = Context::new(store, 1);
-        context.places = Places::new(0, Duration::from_millis(20));
-        let arrival = Arrival {
+        context.upload_checks = ConcurrencyLimit::new(0, Duration::from_millis(20));
+        let received = ReceivedFiles {
             draft,
             video,
             background: None,
@@ -120,7 +126,7 @@ mod tests {
             name: String::new(),
             owner: Owner::local(),
         };
-        let refused = admit(&context, arrival).await.unwrap_err();
+        let refused = admit(&context, received).await.unwrap_err();
         assert_eq!(refused.code(), crate::code::Code::Busy);
     }
 }

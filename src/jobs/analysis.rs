@@ -7,21 +7,20 @@ use utoipa::ToSchema;
 
 use super::decoding::Counted;
 use super::masks::Masks;
-use super::{Attempt, Context, Error, Product, Stages, overlay, refusal};
+use super::{Attempt, Error, JobInput, Product, Stages, overlay, refusal};
 use crate::analysis::similarity::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{self, Params, analyze};
 use crate::footage::{FrameSource, Part};
 use crate::formats::distance_map::DistanceMap;
 use crate::formats::library_json::FootageSummary;
 use crate::formats::{csv, library_dir, svg};
-use crate::ids::{FootageId, JobId, LibraryId};
+use crate::ids::{FootageId, LibraryId};
 use crate::library::{Library, View};
 use crate::media::{Limits, Notice, ReadOptions, Video, read_image};
 use crate::progress::Progress;
 use crate::store::footage::{BACKGROUND, Footage, MASKS, VIDEO};
 use crate::store::jobs::Kind;
-use crate::store::jobs::finish::Made;
-use crate::store::owners::Account;
+use crate::store::jobs::finish::Source;
 use crate::{cpu, store};
 
 /// Stages with their share of the running time; measured.
@@ -88,22 +87,11 @@ pub fn read_options(params: &Params) -> ReadOptions {
     }
 }
 
-/// Queues an analysis. If `after_job` is given, the analysis starts after that job, which makes its footage.
-/// Returns the id of the job and the id that the library will have.
-pub async fn enqueue(
-    context: &Context,
-    input: &Input,
-    after_job: Option<JobId>,
-    account: &Account,
-) -> Result<(JobId, LibraryId), store::Error> {
-    let queued = context.enqueue(Kind::Analysis, input, after_job, account);
-    let (job_id, library_id) = queued.await?;
-    Ok((job_id, LibraryId(library_id)))
-}
+impl JobInput for Input {
+    const KIND: Kind = Kind::Analysis;
+    type ResultId = LibraryId;
 
-impl Input {
-    /// Measures the footage, writes the library into the folder of the attempt, and returns the result's row.
-    pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
+    fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
         let footage = attempt.footage(self.footage_id)?;
         let limits = Limits {
             threads: u32::try_from(attempt.threads).unwrap_or(0),
@@ -114,11 +102,12 @@ impl Input {
         let hints = read_options(&self.params);
         let video = Video::open_with(&path_of(VIDEO), &limits, &hints)?;
         let given = (!footage.masks_sha256.is_empty()).then(|| path_of(MASKS));
-        let masks = Masks::open(&video, (&path_of(VIDEO), given.as_deref()), &limits, &hints)?;
+        let masks = Masks::open(&video, &path_of(VIDEO), given.as_deref(), &limits, &hints)?;
         let masked = masks.as_ref().map(|masks| masks.over(&video)).transpose()?;
-        let background = match footage.background_sha256.is_empty() {
-            true => None,
-            false => Some(read_image(&path_of(BACKGROUND), &limits)?),
+        let background = if footage.background_sha256.is_empty() {
+            None
+        } else {
+            Some(read_image(&path_of(BACKGROUND), &limits)?)
         };
         let level = cpu::Level::detect();
         let progress = attempt.listener;
@@ -129,7 +118,7 @@ impl Input {
         };
         let film = Counted::new(source, progress);
         let library = analyze(&film, background, &self.params, level, &scratch, progress)
-            .map_err(|cause| refusal::illustrated(source, cause))?;
+            .map_err(|cause| refusal::with_picture(source, cause))?;
         self.write(attempt, &library, &footage)?;
         overlay::film(
             &Part::new(source, self.params.from_s, self.params.to_s),
@@ -138,12 +127,14 @@ impl Input {
             progress,
         )?;
         Ok(Product {
-            made: Made::Library(self.footage_id.0),
+            source: Source::Resource(self.footage_id.0),
             params: serde_json::to_string(&self.params)?,
-            summary: serde_json::to_string(&Summary::of(&library, &self.params, video.notices()))?,
+            summary: serde_json::to_string(&Summary::new(&library, &self.params, video.notices()))?,
         })
     }
+}
 
+impl Input {
     fn write(&self, attempt: &Attempt, library: &Library, footage: &Footage) -> Result<(), Error> {
         attempt.listener.report("writing", 0.0);
         let folder = attempt.folder();
@@ -179,7 +170,7 @@ impl Input {
 }
 
 impl Summary {
-    fn of(library: &Library, params: &Params, notices: &[Notice]) -> Summary {
+    fn new(library: &Library, params: &Params, notices: &[Notice]) -> Summary {
         let stats = &library.stats;
         Summary {
             fps: library.poses.fps,
@@ -194,7 +185,7 @@ impl Summary {
             component_share: stats.component_share,
             clip_frames: library.clip_frames,
             length_px: stats.length_px,
-            advice: Advice::all(library, params, notices),
+            advice: Advice::for_library(library, params, notices),
         }
     }
 }
@@ -209,7 +200,7 @@ impl Advice {
     }
 
     /// Returns the weaknesses of a library, most serious first, followed by remarks on its video file.
-    pub fn all(library: &Library, params: &Params, notices: &[Notice]) -> Vec<Advice> {
+    pub fn for_library(library: &Library, params: &Params, notices: &[Notice]) -> Vec<Advice> {
         let all = analysis::stats::advice(library, params);
         let of_library = all.iter().map(|one| Advice::new(one.code(), one));
         let of_file = notices

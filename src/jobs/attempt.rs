@@ -9,10 +9,14 @@ use uuid::Uuid;
 use super::{Error, Listener};
 use crate::formats::library_dir;
 use crate::ids::{FootageId, LibraryId};
+use crate::library::Library;
+use crate::progress::Progress;
 use crate::scratch::Scratch;
-use crate::store::jobs::finish::Made;
-use crate::store::owners::Reach;
-use crate::store::{Draft, Fetched, Spill, Store, footage, libraries};
+use crate::store::footage::Footage;
+use crate::store::jobs::finish::Source;
+use crate::store::owners::OwnerFilter;
+use crate::store::resources::{self, Resource};
+use crate::store::{Draft, Fetched, Spill, Store};
 
 /// One attempt at a job: its folder, its access to stored data, and its progress reports.
 pub struct Attempt<'a> {
@@ -28,8 +32,8 @@ pub struct Attempt<'a> {
 /// Result of an attempt. The files are in its draft.
 #[derive(Clone, Debug)]
 pub struct Product {
-    /// Kind of the result, and its source.
-    pub made: Made,
+    /// What the result was made from.
+    pub source: Source,
     /// All parameters, JSON.
     pub params: String,
     /// Summary for overviews, JSON.
@@ -66,38 +70,25 @@ impl<'a> Attempt<'a> {
 
     /// Returns the row of a footage. Must be called on a blocking thread. Fails if the footage does not
     /// exist.
-    pub fn footage(&self, id: FootageId) -> Result<footage::Footage, Error> {
-        let row = self
-            .runtime
-            .block_on(self.store.footage(id.0, &Reach::All))?;
-        row.ok_or(Error::InputAbsent(id.0))
+    pub fn footage(&self, id: FootageId) -> Result<Footage, Error> {
+        self.row::<Footage>(id.0)
     }
 
-    /// Returns the row of a library and its files as local files. Must be called on a blocking thread. Fails
-    /// if the library does not exist.
-    pub fn library(&self, id: LibraryId) -> Result<(libraries::Library, Fetched), Error> {
-        let row = self
-            .runtime
-            .block_on(self.store.library(id.0, &Reach::All))?;
-        let row = row.ok_or(Error::InputAbsent(id.0))?;
+    /// Reads a library. Must be called on a blocking thread. Fails if the library does not exist.
+    pub fn library(&self, id: LibraryId) -> Result<Library, Error> {
+        let row = self.row::<resources::Library>(id.0)?;
         let files = self.fetch(&row.folder, &library_dir::FILES)?;
-        Ok((row, files))
+        self.listener.report("loading", 0.0);
+        Ok(library_dir::read(files.path(), self.scratch())?.library)
+    }
+
+    fn row<R: Resource>(&self, id: Uuid) -> Result<R::Row, Error> {
+        let row = self.store.resource::<R>(id, &OwnerFilter::All);
+        self.runtime.block_on(row)?.ok_or(Error::InputAbsent(id))
     }
 
     /// Returns stored files as local files. Must be called on a blocking thread.
     pub fn fetch(&self, folder: &str, names: &[&str]) -> Result<Fetched, Error> {
         Ok(self.runtime.block_on(self.store.fetch(folder, names))?)
     }
-}
-
-/// Returns the folder of a result in the blob store. It contains the fence, so that two attempts never share
-/// a folder.
-pub(super) fn folder_of(made: Made, result: Uuid, fence: i64) -> String {
-    let kind = match made {
-        Made::Sample(_) => "footage",
-        Made::Library(_) => "libraries",
-        Made::Flock(_) => "flocks",
-        Made::Fish(_) => "fish",
-    };
-    format!("{kind}/{result}.{fence}")
 }

@@ -42,7 +42,7 @@ pub enum Error {
     LibraryDir(#[from] formats::library_dir::Error),
     /// The distance matrix of the library would be too large.
     #[error(transparent)]
-    Numbers(#[from] formats::npy::Error),
+    DistanceArray(#[from] formats::npy::Error),
     /// The store failed.
     #[error(transparent)]
     Store(#[from] store::Error),
@@ -54,11 +54,11 @@ pub enum Error {
     Panicked,
     /// The job exceeded its time limit.
     #[error("the job exceeded its time limit")]
-    OverTime,
+    TimeLimit,
     /// The disk has too little space for the job's output.
     #[error("the disk has too little free space for the output of the job")]
-    NoRoom,
-    /// No permit for work during a request became free in time (`places`).
+    DiskFull,
+    /// No permit for work during a request became free in time ([`super::ConcurrencyLimit`]).
     #[error("the service is too busy: try again soon")]
     Busy,
     /// A user cancelled the job, or the process is stopping.
@@ -77,13 +77,13 @@ impl Error {
             Error::Analysis(error) | Error::Refused { cause: error, .. } => error.code(),
             Error::Flock(error) => error.code(),
             Error::Fish(error) => error.code(),
-            Error::LibraryDir(error) => of_library_dir(error),
-            Error::Numbers(error) => error.code(),
+            Error::LibraryDir(error) => code_of_library_dir(error),
+            Error::DistanceArray(error) => error.code(),
             Error::Store(error) => error.code(),
-            Error::Io(error) => of_io(error),
+            Error::Io(error) => code_of_io(error),
             Error::Panicked => Code::Internal,
-            Error::OverTime => Code::TimeLimit,
-            Error::NoRoom => Code::StorageFull,
+            Error::TimeLimit => Code::TimeLimit,
+            Error::DiskFull => Code::StorageFull,
             Error::Busy => Code::Busy,
             Error::Cancelled => Code::Cancelled,
         }
@@ -99,7 +99,7 @@ impl Error {
 
     /// Returns whether another attempt may succeed. True for errors of the file system, the database and the
     /// start of media tools; false for bad input, a full disk and panics.
-    pub fn may_pass(&self) -> bool {
+    pub fn is_transient(&self) -> bool {
         match self {
             Error::Store(_) | Error::Io(_) | Error::Media(media::Error::Io { .. }) => {
                 self.code() == Code::Internal
@@ -115,14 +115,14 @@ impl Error {
     }
 }
 
-fn of_library_dir(error: &formats::library_dir::Error) -> Code {
+fn code_of_library_dir(error: &formats::library_dir::Error) -> Code {
     match error {
-        formats::library_dir::Error::Io { cause, .. } => of_io(cause),
+        formats::library_dir::Error::Io { cause, .. } => code_of_io(cause),
         _ => Code::Internal,
     }
 }
 
-fn of_io(error: &std::io::Error) -> Code {
+fn code_of_io(error: &std::io::Error) -> Code {
     match error.kind() {
         std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => Code::StorageFull,
         _ => Code::Internal,
@@ -134,17 +134,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tool_that_could_not_be_started_for_a_moment_is_tried_again_and_bad_input_never() {
+    fn failed_start_of_a_tool_is_transient_and_bad_input_is_not() {
         let io = |kind: std::io::ErrorKind| media::Error::Io {
             doing: "starting the media tool",
             source: kind.into(),
         };
         let busy = || io(std::io::ErrorKind::WouldBlock);
-        assert!(Error::Media(busy()).may_pass());
-        assert!(Error::Source(busy().into()).may_pass());
+        assert!(Error::Media(busy()).is_transient());
+        assert!(Error::Source(busy().into()).is_transient());
         for error in [media::Error::TimeLimit, media::Error::NoVideoStream] {
-            assert!(!Error::Source(error.into()).may_pass());
+            assert!(!Error::Source(error.into()).is_transient());
         }
-        assert!(!Error::Media(media::Error::StorageFull).may_pass());
+        assert!(!Error::Media(media::Error::StorageFull).is_transient());
     }
 }

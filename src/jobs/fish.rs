@@ -5,17 +5,15 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::{Attempt, Context, Error, Product, Stages};
+use super::{Attempt, Error, JobInput, Product, Stages};
 use crate::fish::{Film, Params, drive};
-use crate::formats::{glb, library_dir};
-use crate::ids::{FishId, JobId, LibraryId};
+use crate::formats::glb;
+use crate::ids::{FishId, LibraryId};
 use crate::media::{VideoFormat, VideoWriter};
 use crate::progress::Progress;
 use crate::raster::{ColorSpec, Frame};
-use crate::store;
 use crate::store::jobs::Kind;
-use crate::store::jobs::finish::Made;
-use crate::store::owners::Account;
+use crate::store::jobs::finish::Source;
 
 /// Stages with their share of the running time.
 pub const STAGES: Stages = &[("loading", 0.05), ("rendering", 0.95)];
@@ -43,25 +41,12 @@ pub struct Summary {
     pub visible_frames: usize,
 }
 
-/// Queues a virtual fish. If `after_job` is given, it starts after that job, which makes its library. Returns
-/// the id of the job and the id that the fish will have.
-pub async fn enqueue(
-    context: &Context,
-    input: &Input,
-    after_job: Option<JobId>,
-    account: &Account,
-) -> Result<(JobId, FishId), store::Error> {
-    let queued = context.enqueue(Kind::Fish, input, after_job, account);
-    let (job_id, fish_id) = queued.await?;
-    Ok((job_id, FishId(fish_id)))
-}
+impl JobInput for Input {
+    const KIND: Kind = Kind::Fish;
+    type ResultId = FishId;
 
-impl Input {
-    /// Moves the fish, writes model and video into the folder of the attempt, and returns the result's row.
-    pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
-        let (_, files) = attempt.library(self.library_id)?;
-        attempt.listener.report("loading", 0.0);
-        let library = library_dir::read(files.path(), attempt.scratch())?.library;
+    fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
+        let library = attempt.library(self.library_id)?;
         let motion = drive(&library.poses, &self.params)?;
         std::fs::write(attempt.folder().join("model.glb"), glb::write(&motion))?;
         let summary = Summary {
@@ -76,7 +61,7 @@ impl Input {
         };
         render(attempt, &Film::new(motion, library.background))?;
         Ok(Product {
-            made: Made::Fish(self.library_id.0),
+            source: Source::Resource(self.library_id.0),
             params: serde_json::to_string(&self.params)?,
             summary: serde_json::to_string(&summary)?,
         })

@@ -1,5 +1,6 @@
 //! Given masks of the animal: mask videos that came with the footage, or the alpha channel of the footage.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::Error;
@@ -7,9 +8,9 @@ use crate::footage::{FrameSource, Masked, Visit};
 use crate::media::{Limits, ReadOptions, Video};
 
 /// Alpha below which a pixel counts as transparent, 0..=255. Free choice.
-const OPAQUE: u8 = 250;
+const MIN_OPAQUE_ALPHA: u8 = 250;
 /// Number of frames of an alpha channel that are checked for transparency. Free choice.
-const N_LOOKED_AT: usize = 16;
+const N_CHECKED_FRAMES: usize = 16;
 
 /// The masks of a footage.
 pub struct Masks {
@@ -26,7 +27,8 @@ impl Masks {
     /// Fails if the masks cannot be read.
     pub fn open(
         footage: &Video,
-        (path, given): (&Path, Option<&Path>),
+        path: &Path,
+        given: Option<&Path>,
         limits: &Limits,
         hints: &ReadOptions,
     ) -> Result<Option<Masks>, Error> {
@@ -54,7 +56,7 @@ impl Masks {
             video,
             is_mixed: false,
         };
-        Ok(masks.tell_anything()?.then_some(masks))
+        Ok(masks.has_transparency()?.then_some(masks))
     }
 
     /// Returns the footage with its masks. Fails if their picture sizes differ.
@@ -63,19 +65,20 @@ impl Masks {
     }
 
     /// Returns whether any checked frame has transparent pixels.
-    fn tell_anything(&self) -> Result<bool, Error> {
-        let mut tells = false;
-        let mut look: Box<Visit<'_>> = Box::new(|frame| {
+    fn has_transparency(&self) -> Result<bool, Error> {
+        let mut found = false;
+        let mut visit: Box<Visit<'_>> = Box::new(|frame| {
             let levels = frame.gray_levels();
-            let is_clear = |&luma: &u8| levels[usize::from(luma)] < OPAQUE;
-            tells |= frame.luma().iter().any(is_clear);
-            match tells {
-                true => std::ops::ControlFlow::Break(()),
-                false => std::ops::ControlFlow::Continue(()),
+            let is_clear = |&luma: &u8| levels[usize::from(luma)] < MIN_OPAQUE_ALPHA;
+            found |= frame.luma().iter().any(is_clear);
+            if found {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
             }
         });
-        self.video.spread(N_LOOKED_AT, &mut look)?;
-        drop(look);
-        Ok(tells)
+        self.video.spread(N_CHECKED_FRAMES, &mut visit)?;
+        drop(visit);
+        Ok(found)
     }
 }

@@ -6,39 +6,26 @@
 //! of the results is kept.
 
 // How jobs are run.
-pub mod supervisor; // start of workers, rescue of jobs, graceful stop
-
-pub mod worker; // claim, run and finish one job
-
-pub mod allotted; // ids for idempotent requests
-
 pub mod attempt; // input and output of one attempt
-
+pub mod id_sequence; // ids for idempotent requests
 pub mod listener; // progress and cancellation
-
 pub mod meters; // metrics
+pub mod supervisor; // start of workers, rescue of jobs, graceful stop
+pub mod worker; // claim, run and finish one job
 
 mod decoding; // metrics of decoding
 
 // The kinds of jobs, and related computations.
 pub mod admit; // received files -> footage
-
-pub mod sample; // nothing -> sample footage
-
 pub mod analysis; // footage -> library
-
-pub mod flock; // library -> flock
-
+pub mod concurrency; // limits of simultaneous work
 pub mod fish; // library -> virtual fish
-pub mod overlay; // footage -> video with its poses drawn over it
-
+pub mod flock; // library -> flock
 pub mod masks; // footage -> given masks or alpha channel
-
+pub mod overlay; // footage -> video with its poses drawn over it
 pub mod refusal; // refused footage -> picture of the reason
-
-pub mod at_once; // library -> computations during a request
-
-pub mod places; // limits of simultaneous work
+pub mod sample; // nothing -> sample footage
+pub mod synchronous; // library -> computations during a request
 
 pub mod clock;
 pub mod error;
@@ -47,17 +34,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use tokio::sync::Notify;
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 pub use attempt::{Attempt, Product};
+pub use concurrency::ConcurrencyLimit;
 pub use error::Error;
+pub use id_sequence::IdSequence;
 pub use listener::{Listener, Stages};
 pub use meters::Meters;
-pub use places::Places;
-
-use allotted::next_id;
 
 use crate::config::JobSettings;
 use crate::ids::JobId;
@@ -86,13 +73,13 @@ pub struct Context {
     /// Maximum number of queued and running jobs of all owners.
     pub max_queued: i64,
     /// Free disk space below which jobs are stopped, bytes. It keeps space for the database.
-    pub least_room_bytes: u64,
+    pub min_free_bytes: u64,
     /// Metrics of the jobs of this process.
     pub meters: Meters,
     /// Limit of simultaneous checks of uploads.
-    pub places: Places,
+    pub upload_checks: ConcurrencyLimit,
     /// Limit of simultaneous computations during requests.
-    pub at_once: Places,
+    pub synchronous_work: ConcurrencyLimit,
 }
 
 impl Context {
@@ -104,34 +91,34 @@ impl Context {
     }
 
     /// Returns whether the free disk space is below the limit for jobs.
-    fn lacks_room(&self) -> bool {
-        let room = self.store.blobs().room_bytes();
-        room.is_ok_and(|room_bytes| room_bytes < self.least_room_bytes)
+    fn lacks_disk_space(&self) -> bool {
+        let free = self.store.blobs().free_bytes();
+        free.is_ok_and(|free_bytes| free_bytes < self.min_free_bytes)
     }
 
     /// Queues a job, after `after_job` if that makes its input. Returns the id of the job and the id that its
-    /// result will have. The ids are chosen in this order, because a repeated request must get the same ones.
-    async fn enqueue<Input: Serialize>(
+    /// result will have. Both are the next ids of `ids`, in this order.
+    pub async fn enqueue<Input: JobInput>(
         &self,
-        kind: Kind,
         input: &Input,
         after_job: Option<JobId>,
         account: &Account,
-    ) -> Result<(JobId, Uuid), store::Error> {
-        let (job_id, result_id) = (JobId(next_id()), next_id());
+        ids: &mut IdSequence,
+    ) -> Result<(JobId, Input::ResultId), store::Error> {
+        let (job_id, result_id) = (JobId(ids.next_id()), ids.next_id());
         let job = NewJob {
             job_id,
             account: account.clone(),
-            kind,
+            kind: Input::KIND,
             input: serde_json::json!(input).to_string(),
             result_id,
             after_job,
             priority: 0,
-            room: self.max_queued,
+            max_queued: self.max_queued,
         };
         self.store.enqueue(&job, self.now_ms().await?).await?;
         self.wake.notify_one();
-        Ok((job_id, result_id))
+        Ok((job_id, result_id.into()))
     }
 
     /// Returns a context with default settings.
@@ -145,47 +132,37 @@ impl Context {
             budget: Duration::from_secs(JobSettings::JOB_TIME_S),
             sweep_every: Duration::from_secs(3600),
             max_queued: i64::MAX,
-            least_room_bytes: 0,
+            min_free_bytes: 0,
             meters: Meters::default(),
-            places: Places::of_cores(),
-            at_once: Places::one(),
+            upload_checks: ConcurrencyLimit::per_core(),
+            synchronous_work: ConcurrencyLimit::one(),
         }
     }
 }
 
-/// A job with its decoded input.
-#[derive(Clone, Debug)]
-pub enum Job {
-    /// Makes the sample footage.
-    Sample(sample::Input),
-    /// Makes a library from footage.
-    Analysis(Box<analysis::Input>),
-    /// Makes a flock from a library.
-    Flock(Box<flock::Input>),
-    /// Makes a virtual fish from a library.
-    Fish(fish::Input),
+/// Input of a job. It is stored with the job as JSON.
+pub trait JobInput: Serialize + DeserializeOwned {
+    /// Kind of the job.
+    const KIND: Kind;
+    /// Type of the id of the result.
+    type ResultId: From<Uuid>;
+
+    /// Makes the result on the calling thread, and leaves its files in the folder of the attempt.
+    fn run(&self, attempt: &Attempt) -> Result<Product, Error>;
 }
 
-impl Job {
-    /// Decodes the input of a claimed job.
-    pub fn decode(lease: &Lease) -> Result<Job, Error> {
-        Ok(match lease.kind {
-            Kind::Sample => Job::Sample(serde_json::from_str(&lease.input)?),
-            Kind::Analysis => Job::Analysis(serde_json::from_str(&lease.input)?),
-            Kind::Flock => Job::Flock(serde_json::from_str(&lease.input)?),
-            Kind::Fish => Job::Fish(serde_json::from_str(&lease.input)?),
-        })
+/// Runs a claimed job on the calling thread.
+pub fn run(lease: &Lease, attempt: &Attempt) -> Result<Product, Error> {
+    match lease.kind {
+        Kind::Sample => run_input::<sample::Input>(lease, attempt),
+        Kind::Analysis => run_input::<analysis::Input>(lease, attempt),
+        Kind::Flock => run_input::<flock::Input>(lease, attempt),
+        Kind::Fish => run_input::<fish::Input>(lease, attempt),
     }
+}
 
-    /// Runs the job on the calling thread.
-    pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
-        match self {
-            Job::Sample(input) => input.run(attempt),
-            Job::Analysis(input) => input.run(attempt),
-            Job::Flock(input) => input.run(attempt),
-            Job::Fish(input) => input.run(attempt),
-        }
-    }
+fn run_input<Input: JobInput>(lease: &Lease, attempt: &Attempt) -> Result<Product, Error> {
+    serde_json::from_str::<Input>(&lease.input)?.run(attempt)
 }
 
 /// Returns the stages of a kind of job.

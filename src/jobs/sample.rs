@@ -5,18 +5,18 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Attempt, Context, Error, Product, Stages, analysis, flock};
+use super::{Attempt, Context, Error, IdSequence, JobInput, Product, Stages, analysis, flock};
 use crate::fish::sample::{SampleFilm, SampleParams};
 use crate::footage::FrameSource;
-use crate::ids::{FootageId, JobId};
+use crate::ids::FootageId;
 use crate::media::VideoWriter;
 use crate::progress::Progress;
 use crate::raster::Frame;
 use crate::store;
-use crate::store::footage::{Filmed, VIDEO};
+use crate::store::footage::{Footage, SampleFootage, VIDEO};
 use crate::store::jobs::Kind;
-use crate::store::jobs::finish::Made;
-use crate::store::owners::{Account, Reach};
+use crate::store::jobs::finish::Source;
+use crate::store::owners::{Account, OwnerFilter};
 
 /// Stages with their share of the running time.
 pub const STAGES: Stages = &[("filming", 1.0)];
@@ -40,40 +40,34 @@ impl Default for Input {
 /// queue.
 pub async fn fill(context: &Context) -> Result<(), store::Error> {
     let store = &context.store;
-    let has_footage = !store.list_footage(1, None, &Reach::All).await?.is_empty();
-    if has_footage || store.has_jobs_under_way().await? {
+    let newest = store.list_resources::<Footage>(1, None, &OwnerFilter::All);
+    if !newest.await?.is_empty() || store.has_jobs_under_way().await? {
         return Ok(());
     }
-    let account = Account::local();
-    let (sample_job, footage_id) = enqueue(context, &Input::default(), &account).await?;
-    let measure = analysis::Input {
+    let (account, mut ids) = (Account::local(), IdSequence::random());
+    let input = Input::default();
+    let sample = context.enqueue(&input, None, &account, &mut ids);
+    let (sample_job, footage_id) = sample.await?;
+    let analysis = analysis::Input {
         footage_id,
         params: crate::analysis::Params::default(),
     };
-    let queued = analysis::enqueue(context, &measure, Some(sample_job), &account);
-    let (analysis_job, library_id) = queued.await?;
-    let make = flock::Input {
+    let analysis = context.enqueue(&analysis, Some(sample_job), &account, &mut ids);
+    let (analysis_job, library_id) = analysis.await?;
+    let flock = flock::Input {
         library_id,
         params: crate::flock::Params::default(),
     };
-    flock::enqueue(context, &make, Some(analysis_job), &account).await?;
+    let flock = context.enqueue(&flock, Some(analysis_job), &account, &mut ids);
+    flock.await?;
     Ok(())
 }
 
-/// Queues a sample. Returns the id of the job and the id that the footage will have.
-pub async fn enqueue(
-    context: &Context,
-    input: &Input,
-    account: &Account,
-) -> Result<(JobId, FootageId), store::Error> {
-    let queued = context.enqueue(Kind::Sample, input, None, account);
-    let (job_id, footage_id) = queued.await?;
-    Ok((job_id, FootageId(footage_id)))
-}
+impl JobInput for Input {
+    const KIND: Kind = Kind::Sample;
+    type ResultId = FootageId;
 
-impl Input {
-    /// Films the virtual fish and leaves the video in the folder of the attempt.
-    pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
+    fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
         let film = SampleFilm::new(SampleParams {
             n_frames: self.n_frames,
             ..SampleParams::default()
@@ -85,7 +79,7 @@ impl Input {
         std::fs::rename(&written, &path)?;
         let format = film.format();
         Ok(Product {
-            made: Made::Sample(Filmed {
+            source: Source::Nothing(SampleFootage {
                 name: "sample.mp4",
                 width: format.width,
                 height: format.height,

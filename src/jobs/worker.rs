@@ -14,10 +14,9 @@ use tokio::time::{Instant, MissedTickBehavior, interval};
 use tracing::{Instrument, Span};
 use uuid::Uuid;
 
-use super::attempt::folder_of;
 use super::clock::now_ms;
 use super::listener::Position;
-use super::{Attempt, Context, Error, Job, Listener, Product, stages};
+use super::{Attempt, Context, Error, Listener, Product, run, stages};
 use crate::code::Code;
 use crate::ids::JobId;
 use crate::store;
@@ -31,13 +30,13 @@ const TICK: Duration = Duration::from_millis(500);
 /// Maximum number of attempts if errors may be transient. Free choice.
 const MAX_ATTEMPTS: i64 = 3;
 /// Maximum wait for the computation to stop after it was cancelled. Afterwards it is abandoned. Free choice.
-const LET_GO: Duration = Duration::from_secs(10);
+const STOP_GRACE: Duration = Duration::from_secs(10);
 /// Wait before the second attempt, milliseconds. Every further wait is four times as long. Free choice.
 const BACKOFF_MS: i64 = 2_000;
 
 /// Increase of the nice value of a job's threads. At 10, a job gets about a tenth of the processor time of a
 /// request under load.
-const PATIENCE: i32 = 10;
+const NICE_INCREMENT: i32 = 10;
 
 /// Outcome of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,8 +75,7 @@ impl Worker {
 
     /// Claims the next job, runs it and ends it.
     pub async fn step(&self) -> Result<Step, store::Error> {
-        self.step_by(|lease, attempt| Job::decode(lease)?.run(attempt))
-            .await
+        self.step_by(run).await
     }
 
     /// Does the same as [`Worker::step`], but with `run` as the computation. For tests of the queue.
@@ -127,50 +125,50 @@ impl Worker {
         let mut tick = interval(TICK.min(self.context.lease / 3));
         tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (start, mut last_beat) = (Instant::now(), Instant::now());
-        let mut noted = listener.position();
-        let (mut told_to_stop, mut lacks_room) = (None, false);
+        let mut stored_position = listener.position();
+        let (mut stop_requested_at, mut lacks_disk_space) = (None, false);
         loop {
             tokio::select! {
-                ended = &mut work => return self.unless_stopped(start, lacks_room, ended),
+                ended = &mut work => return self.with_stop_reason(start, lacks_disk_space, ended),
                 _ = tick.tick() => {}
             }
-            lacks_room |= self.context.lacks_room();
+            lacks_disk_space |= self.context.lacks_disk_space();
             let is_late = start.elapsed() > self.context.budget;
-            if is_late || lacks_room || self.context.draining.is_cancelled() {
+            if is_late || lacks_disk_space || self.context.draining.is_cancelled() {
                 listener.cancel();
-                let let_go = LET_GO.min(self.context.lease);
-                if told_to_stop.get_or_insert_with(Instant::now).elapsed() > let_go {
+                let grace = STOP_GRACE.min(self.context.lease);
+                if stop_requested_at.get_or_insert_with(Instant::now).elapsed() > grace {
                     // A thread cannot be stopped from outside. It continues, and its result is discarded.
-                    return self.unless_stopped(start, lacks_room, Err(Error::Cancelled));
+                    return self.with_stop_reason(start, lacks_disk_space, Err(Error::Cancelled));
                 }
             }
             let position = listener.position();
-            if position != noted || last_beat.elapsed() >= self.context.lease / 3 {
+            if position != stored_position || last_beat.elapsed() >= self.context.lease / 3 {
                 self.beat(lease, listener, position).await;
-                (noted, last_beat) = (position, Instant::now());
+                (stored_position, last_beat) = (position, Instant::now());
             }
         }
     }
 
     /// Replaces the error of a computation that was stopped for its time limit or for lack of disk space. The
     /// error then states that reason.
-    fn unless_stopped(
+    fn with_stop_reason(
         &self,
         start: Instant,
-        lacks_room: bool,
+        lacks_disk_space: bool,
         result: Result<Outcome, Error>,
     ) -> Result<Outcome, Error> {
-        match start.elapsed() > self.context.budget {
-            _ if lacks_room => result.map_err(|error| {
-                tracing::warn!(%error, "a job was stopped: too little disk space");
-                Error::NoRoom
-            }),
-            true => result.map_err(|error| {
-                tracing::warn!(%error, "a job was stopped: time limit exceeded");
-                Error::OverTime
-            }),
-            false => result,
-        }
+        let reason = if lacks_disk_space {
+            Error::DiskFull
+        } else if start.elapsed() > self.context.budget {
+            Error::TimeLimit
+        } else {
+            return result;
+        };
+        result.map_err(|error| {
+            tracing::warn!(%error, %reason, "a job was stopped");
+            reason
+        })
     }
 
     async fn beat(&self, lease: &Lease, listener: &Listener, at: Position) {
@@ -213,7 +211,7 @@ impl Worker {
                     (store.stop(lease, now_ms()).await?, Step::Cancelled(job))
                 }
             }
-            Err(error) if error.may_pass() && lease.attempt < MAX_ATTEMPTS => {
+            Err(error) if error.is_transient() && lease.attempt < MAX_ATTEMPTS => {
                 tracing::warn!(job.id = %job, %error, "transient error in a job; it is retried");
                 let wait_ms = BACKOFF_MS << (2 * (lease.attempt - 1));
                 let run_at_ms = self.context.now_ms().await? + wait_ms;
@@ -222,8 +220,8 @@ impl Worker {
             }
             Err(error) => {
                 let code = error.code();
-                let (said, picture) = (said(&error), error.picture());
-                let change = store.fail(lease, code, &said, picture, now_ms()).await?;
+                let (message, picture) = (user_message(&error), error.picture());
+                let change = store.fail(lease, code, &message, picture, now_ms()).await?;
                 (change, Step::Failed(job, code))
             }
         };
@@ -250,7 +248,10 @@ where
     Run: FnOnce(&Lease, &Attempt) -> Result<Product, Error> + Send + 'static,
 {
     let (store, threads, runtime) = (context.store.clone(), context.threads, Handle::current());
-    let (blobs, result_id, fence) = (store.blobs().clone(), lease.result_id, lease.fence);
+    let blobs = store.blobs().clone();
+    // The fence in the name prevents two attempts from sharing a folder.
+    let (kind, result_id, fence) = (lease.kind.result_kind(), lease.result_id, lease.fence);
+    let folder = format!("{}/{result_id}.{fence}", kind.plural());
     let span = Span::current();
     let work = tokio::task::spawn_blocking(move || {
         let _within = span.enter();
@@ -259,23 +260,21 @@ where
             .draft(&format!("{}.{}", lease.job_id, lease.fence))?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
-            .start_handler(|_| step_back())
+            .start_handler(|_| lower_priority())
             .build()
             .map_err(std::io::Error::other)?;
         let attempt = Attempt::new(&store, &draft, &listener, threads, &runtime);
-        let made = pool.install(|| {
+        let (product, files) = pool.install(|| {
             let product = run(&lease, &attempt)?;
             Ok::<_, Error>((product, store.blobs().seal(&draft)?))
-        });
-        let (product, files) = made?;
+        })?;
         Ok::<_, Error>((draft, product, files))
     });
     async move {
         let (draft, product, files) = work.await.unwrap_or(Err(Error::Panicked))?;
-        let folder = folder_of(product.made, result_id, fence);
         blobs.adopt(draft, &folder).await?;
         Ok(Outcome {
-            made: product.made,
+            source: product.source,
             folder,
             files,
             params: product.params,
@@ -286,9 +285,9 @@ where
 
 /// Lowers the priority of the calling thread, and of all threads and processes that it starts later, so that
 /// requests are answered first. Failure is ignored: the job then runs at normal priority.
-fn step_back() {
+fn lower_priority() {
     let usual = getpriority_process(None).unwrap_or(0);
-    if let Err(error) = setpriority_process(None, usual + PATIENCE) {
+    if let Err(error) = setpriority_process(None, usual + NICE_INCREMENT) {
         tracing::debug!(%error, "the priority of a job could not be lowered");
     }
 }
@@ -308,12 +307,12 @@ async fn finish(store: &Store, lease: &Lease, outcome: &Outcome) -> Result<Chang
 /// Returns whether the computation ended because it was cancelled, and not because of an error.
 fn was_stopped(error: &Error, listener: &Listener) -> bool {
     crate::progress::Progress::cancelled(listener)
-        && !matches!(error, Error::OverTime | Error::NoRoom)
+        && !matches!(error, Error::TimeLimit | Error::DiskFull)
 }
 
 /// Returns the message for the user. For internal errors this is only the meaning of the code; the details go
 /// to the log.
-fn said(error: &Error) -> String {
+fn user_message(error: &Error) -> String {
     match error.code() {
         Code::Internal | Code::DecoderCrashed => {
             tracing::error!(%error, "internal error in a job");

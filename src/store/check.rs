@@ -34,7 +34,7 @@ impl Store {
                 faults.push(format!("I2: the folder has no row: {}", folder.name));
             }
         }
-        for (name, sql) in RULES_OF_JOBS {
+        for &(name, sql) in JOB_RULES {
             let broken = sql::query_scalar(sql).bind(now_ms);
             let jobs: Vec<Uuid> = broken.fetch_all(&self.reader).await?;
             faults.extend(jobs.into_iter().map(|job| format!("{name}: {job}")));
@@ -108,7 +108,7 @@ impl Store {
 
 /// Queries that return the job of each row that violates a rule. $1 is the time, milliseconds since 1970.
 /// Constraints of the table ensure that every job is in a legal state (I3).
-const RULES_OF_JOBS: &[(&str, &str)] = &[
+const JOB_RULES: &[(&str, &str)] = &[
     (
         "I4: a done job must have exactly one result with its fence, and any other job none",
         "select j.id from jobs j where $1 is not null and (case when j.state = 'done' then 1 else 0 end) != ( \
@@ -131,3 +131,31 @@ const WRONG_SIZES: &str = "select r.folder from ( \
          select folder, size_bytes from fish) r \
          where r.size_bytes != ( \
          select coalesce(sum(b.size_bytes), -1) from blobs b where b.folder = r.folder)";
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+    use crate::store::blobs;
+
+    #[tokio::test]
+    async fn bytes_appended_to_a_stored_file_are_reported() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        let draft = store.blobs().draft("film").unwrap();
+        fs::write(draft.path().join("video"), b"12345").unwrap();
+        let files = store.blobs().seal(&draft).unwrap();
+        store.blobs().adopt(draft, "footage/a").await.unwrap();
+        let mut transaction = store.begin().await.unwrap();
+        let added = blobs::insert(&mut transaction, "footage/a", &files);
+        added.await.unwrap();
+        transaction.commit().await.unwrap();
+        assert_eq!(store.check(0).await.unwrap(), Vec::<Fault>::new());
+        let path = data.path().join("blobs/footage/a/video");
+        let mut file = fs::File::options().append(true).open(path).unwrap();
+        file.write_all(b"6").unwrap();
+        let faults = store.check(0).await.unwrap();
+        assert_eq!(faults, ["I1: altered: footage/a/video"]);
+    }
+}

@@ -1,4 +1,4 @@
-//! Deletion of user data with everything derived from it. One transaction deletes the rows, and the files are
+//! Deletion of a resource with everything derived from it. One transaction deletes the rows, and the files are
 //! removed after it. A crash in between leaves folders without rows, which the sweep removes.
 //!
 //! The row of a job is deleted with its result. If the job is running, its worker finds no row at the next
@@ -8,106 +8,61 @@
 
 use sqlx::types::Uuid;
 
+use super::resources::ResourceKind;
 use super::{Error, Store, Transaction, sql};
 
 impl Store {
-    /// Deletes a footage, its libraries and everything made from them. Returns false if the footage does not
-    /// exist.
-    pub async fn delete_footage(&self, id: Uuid) -> Result<bool, Error> {
-        self.reserve.lend(|| self.delete_footage_now(id)).await
-    }
-
-    async fn delete_footage_now(&self, id: Uuid) -> Result<bool, Error> {
-        let mut transaction = self.writer.begin().await?;
-        let folder: Option<String> = sql::query_scalar("select folder from footage where id = $1")
-            .bind(id)
-            .fetch_optional(&mut transaction)
-            .await?;
-        let Some(folder) = folder else {
-            return Ok(false);
+    /// Deletes a resource and everything made from it. Returns false if the resource does not exist.
+    pub async fn delete(&self, kind: ResourceKind, id: Uuid) -> Result<bool, Error> {
+        let delete = || async {
+            let mut transaction = self.writer.begin().await?;
+            let folders = match kind {
+                ResourceKind::Footage => delete_footage_rows(&mut transaction, id).await?,
+                ResourceKind::Library => delete_library_rows(&mut transaction, id).await?,
+                ResourceKind::Flock | ResourceKind::Fish => {
+                    delete_film_rows(&mut transaction, id).await?
+                }
+            };
+            for folder in &folders {
+                let delete = sql::query("delete from blobs where folder = $1").bind(folder);
+                delete.execute(&mut transaction).await?;
+            }
+            transaction.commit().await?;
+            for folder in &folders {
+                self.blobs.discard(folder).await?;
+            }
+            let was_there = !folders.is_empty();
+            tracing::info!(resource.kind = kind.plural(), resource.id = %id, was_there, "resource deleted");
+            Ok(was_there)
         };
-        let libraries: Vec<Uuid> = sql::query_scalar(
-            "select result_id from jobs \
-             where kind = 'analysis' and json_extract(input, '$.footage_id') = $1 for update",
-        )
-        .bind(id.to_string())
-        .fetch_all(&mut transaction)
-        .await?;
-        let mut folders = vec![folder];
-        for library in libraries {
-            folders.extend(delete_library_rows(&mut transaction, library).await?);
-        }
-        for sql in [
-            "delete from footage where id = $1",
-            "delete from jobs where result_id = $1",
-        ] {
-            sql::query(sql).bind(id).execute(&mut transaction).await?;
-        }
-        self.forget(transaction, folders).await?;
-        tracing::info!(footage.id = %id, "footage deleted");
-        Ok(true)
+        self.reserve.lend(delete).await
     }
+}
 
-    /// Deletes a library and everything made from it. Returns false if the library does not exist.
-    pub async fn delete_library(&self, id: Uuid) -> Result<bool, Error> {
-        self.reserve.lend(|| self.delete_library_now(id)).await
+/// Deletes the rows of a footage and of everything made from it. Returns the folders that these rows named;
+/// none if the footage does not exist.
+async fn delete_footage_rows(
+    transaction: &mut Transaction,
+    id: Uuid,
+) -> Result<Vec<String>, sqlx::Error> {
+    let mut folders =
+        folders_of(transaction, "select folder from footage where id = $1", id).await?;
+    if folders.is_empty() {
+        return Ok(folders);
     }
-
-    async fn delete_library_now(&self, id: Uuid) -> Result<bool, Error> {
-        let mut transaction = self.writer.begin().await?;
-        let folders = delete_library_rows(&mut transaction, id).await?;
-        let was_there = !folders.is_empty();
-        self.forget(transaction, folders).await?;
-        tracing::info!(library.id = %id, was_there, "library deleted");
-        Ok(was_there)
+    let sql = "select result_id from jobs \
+               where kind = 'analysis' and json_extract(input, '$.footage_id') = $1 for update";
+    let libraries = sql::query_scalar(sql).bind(id.to_string());
+    for library in libraries.fetch_all(&mut *transaction).await? {
+        folders.extend(delete_library_rows(transaction, library).await?);
     }
-
-    /// Deletes a flock or a virtual fish. Returns false if it does not exist.
-    pub async fn delete_film(&self, id: Uuid) -> Result<bool, Error> {
-        self.reserve.lend(|| self.delete_film_now(id)).await
+    for sql in [
+        "delete from footage where id = $1",
+        "delete from jobs where result_id = $1",
+    ] {
+        sql::query(sql).bind(id).execute(&mut *transaction).await?;
     }
-
-    async fn delete_film_now(&self, id: Uuid) -> Result<bool, Error> {
-        let mut transaction = self.writer.begin().await?;
-        sql::query("select 1 from jobs where result_id = $1 for update")
-            .bind(id)
-            .execute(&mut transaction)
-            .await?;
-        let sql = "select folder from flocks where id = $1 union all \
-                   select folder from fish where id = $1";
-        let folders: Vec<String> = sql::query_scalar(sql)
-            .bind(id)
-            .fetch_all(&mut transaction)
-            .await?;
-        for sql in [
-            "delete from flocks where id = $1",
-            "delete from fish where id = $1",
-            "delete from jobs where result_id = $1",
-        ] {
-            sql::query(sql).bind(id).execute(&mut transaction).await?;
-        }
-        let was_there = !folders.is_empty();
-        self.forget(transaction, folders).await?;
-        tracing::info!(result.id = %id, was_there, "result deleted");
-        Ok(was_there)
-    }
-
-    /// Deletes the rows of the files, commits, and removes the folders.
-    async fn forget(
-        &self,
-        mut transaction: Transaction,
-        folders: Vec<String>,
-    ) -> Result<(), Error> {
-        for folder in &folders {
-            let delete = sql::query("delete from blobs where folder = $1").bind(folder);
-            delete.execute(&mut transaction).await?;
-        }
-        transaction.commit().await?;
-        for folder in &folders {
-            self.blobs.discard(folder).await?;
-        }
-        Ok(())
-    }
+    Ok(folders)
 }
 
 /// Deletes the rows of a library and of everything made from it, including jobs that have not finished.
@@ -124,10 +79,7 @@ async fn delete_library_rows(
     let sql = "select folder from libraries where id = $1 union all \
                select folder from flocks where library_id = $1 union all \
                select folder from fish where library_id = $1";
-    let folders = sql::query_scalar(sql)
-        .bind(library)
-        .fetch_all(&mut *transaction)
-        .await?;
+    let folders = folders_of(transaction, sql, library).await?;
     for sql in [
         "delete from flocks where library_id = $1",
         "delete from fish where library_id = $1",
@@ -141,4 +93,33 @@ async fn delete_library_rows(
     let delete = sql::query(sql).bind(library).bind(library.to_string());
     delete.execute(&mut *transaction).await?;
     Ok(folders)
+}
+
+/// Deletes the rows of a flock or virtual fish. Returns the folder that they named.
+async fn delete_film_rows(
+    transaction: &mut Transaction,
+    id: Uuid,
+) -> Result<Vec<String>, sqlx::Error> {
+    let lock = sql::query("select 1 from jobs where result_id = $1 for update").bind(id);
+    lock.execute(&mut *transaction).await?;
+    let sql = "select folder from flocks where id = $1 union all \
+               select folder from fish where id = $1";
+    let folders = folders_of(transaction, sql, id).await?;
+    for sql in [
+        "delete from flocks where id = $1",
+        "delete from fish where id = $1",
+        "delete from jobs where result_id = $1",
+    ] {
+        sql::query(sql).bind(id).execute(&mut *transaction).await?;
+    }
+    Ok(folders)
+}
+
+/// Returns the folders that a statement with the parameter `id` selects.
+async fn folders_of(
+    transaction: &mut Transaction,
+    sql: &'static str,
+    id: Uuid,
+) -> Result<Vec<String>, sqlx::Error> {
+    sql::query_scalar(sql).bind(id).fetch_all(transaction).await
 }

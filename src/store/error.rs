@@ -30,10 +30,10 @@ pub enum Error {
     Bucket(#[from] object_store::Error),
     /// The content of a stored file differs from its recorded size or hash.
     #[error("the size or hash of a stored file has changed: {0}")]
-    Altered(String),
+    CorruptFile(String),
     /// The operation needs a SQLite file, but the database is on a server.
     #[error("the database is on a server: copy it with the server's own tools")]
-    RowsElsewhere,
+    DatabaseOnServer,
     /// Another process serves the same data folder.
     #[error("the data folder is in use by another flockreel: {}", .0.display())]
     InUse(PathBuf),
@@ -41,7 +41,7 @@ pub enum Error {
     #[error(
         "the store belongs to another database: use the matching `--database` and `--store`, or an empty store"
     )]
-    OtherFiles,
+    ForeignFiles,
     /// The upload exceeds its maximum size.
     #[error("the upload is larger than {limit_bytes} bytes")]
     TooLarge {
@@ -50,7 +50,7 @@ pub enum Error {
     },
     /// The video that a sample job made is already stored under another id.
     #[error("the same film was stored by an upload while this job ran")]
-    FilmIsKnown,
+    AlreadyStored,
     /// A repeated request has the ids of an earlier one but different content.
     #[error("the Idempotency-Key belongs to an earlier request with another body, job {0}")]
     IdInUse(sqlx::types::Uuid),
@@ -61,10 +61,12 @@ pub enum Error {
         quota: i64,
     },
     /// The queue has reached the maximum number of queued and running jobs of all owners.
-    #[error("the queue is full ({room} queued and running jobs): try again when some have ended")]
+    #[error(
+        "the queue is full ({max_queued} queued and running jobs): try again when some have ended"
+    )]
     QueueFull {
         /// The maximum of the queue.
-        room: i64,
+        max_queued: i64,
     },
     /// A row contains a value that this version does not know.
     #[error("a row of {table} has a value that this version does not know: {value}")]
@@ -82,28 +84,28 @@ impl Error {
         match self {
             Error::IdInUse(_) => Code::IdempotencyKeyReused,
             Error::TooLarge { .. } => Code::TooLarge,
-            Error::FilmIsKnown => Code::AlreadyStored,
+            Error::AlreadyStored => Code::AlreadyStored,
             Error::QuotaExceeded { .. } => Code::QuotaExceeded,
             Error::QueueFull { .. } => Code::QueueFull,
-            Error::Io(error) if is_full(error) => Code::StorageFull,
-            Error::Sql(sqlx::Error::Io(error)) if is_full(error) => Code::StorageFull,
-            Error::Sql(sqlx::Error::Database(error)) if has_no_room(error.as_ref()) => {
+            Error::Io(error) if is_disk_full(error) => Code::StorageFull,
+            Error::Sql(sqlx::Error::Io(error)) if is_disk_full(error) => Code::StorageFull,
+            Error::Sql(sqlx::Error::Database(error)) if is_database_full(error.as_ref()) => {
                 Code::StorageFull
             }
             Error::Sql(_)
             | Error::Migrate(_)
             | Error::Io(_)
             | Error::Bucket(_)
-            | Error::Altered(_)
+            | Error::CorruptFile(_)
             | Error::InUse(_)
-            | Error::OtherFiles
-            | Error::RowsElsewhere
+            | Error::ForeignFiles
+            | Error::DatabaseOnServer
             | Error::UnknownValue { .. } => Code::Internal,
         }
     }
 }
 
-fn is_full(error: &std::io::Error) -> bool {
+fn is_disk_full(error: &std::io::Error) -> bool {
     matches!(
         error.kind(),
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded
@@ -111,7 +113,7 @@ fn is_full(error: &std::io::Error) -> bool {
 }
 
 /// Returns whether the database's disk is full. PostgreSQL reports this as `disk_full` (53100).
-fn has_no_room(error: &dyn DatabaseError) -> bool {
+fn is_database_full(error: &dyn DatabaseError) -> bool {
     let code = error.code().unwrap_or_default();
     match error.try_downcast_ref::<SqliteError>() {
         Some(_) => (code.parse::<u32>())

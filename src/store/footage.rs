@@ -5,7 +5,8 @@ use std::io;
 use sqlx::types::Uuid;
 
 use super::jobs::Lease;
-use super::owners::{Owner, Reach};
+use super::jobs::finish::Outcome;
+use super::owners::Owner;
 use super::{BlobFile, Draft, Error, Store, Transaction, blobs, sql};
 
 /// File name of the video in its folder.
@@ -51,7 +52,7 @@ pub struct Footage {
 
 /// Properties of a video that a sample job made.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Filmed {
+pub struct SampleFootage {
     /// Label of the footage.
     pub name: &'static str,
     /// Width in square pixels.
@@ -112,24 +113,6 @@ impl Store {
         }
     }
 
-    /// Returns the footage if it exists and is visible to the caller.
-    pub async fn footage(&self, id: Uuid, reach: &Reach) -> Result<Option<Footage>, Error> {
-        let sql = "select * from footage where id = $1 and ($2 is null or owner = $2)";
-        self.one_of(sql, id, reach).await
-    }
-
-    /// Returns the newest footage with ids less than `before`, at most `limit`.
-    pub async fn list_footage(
-        &self,
-        limit: i64,
-        before: Option<Uuid>,
-        reach: &Reach,
-    ) -> Result<Vec<Footage>, Error> {
-        let sql = "select * from footage where ($1 is null or id < $1) \
-                   and ($3 is null or owner = $3) order by id desc limit $2";
-        self.newest_of(sql, limit, before, reach).await
-    }
-
     async fn footage_of_bytes(&self, footage: &Footage) -> Result<Option<Footage>, Error> {
         let sql = "select * from footage where sha256 = $1 and background_sha256 = $2 \
                    and owner = $3 and masks_sha256 = $4";
@@ -173,15 +156,16 @@ impl Store {
     }
 }
 
-/// Adds the row of the sample that a finished job made; `files` contains its video. Fails with
-/// [`Error::FilmIsKnown`] if the owner has uploaded the same file in the meantime.
-pub(super) async fn insert_filmed(
+/// Adds the row of the sample that a finished job made. Fails with
+/// [`Error::AlreadyStored`] if the owner has uploaded the same file in the meantime.
+pub(super) async fn insert_sample(
     transaction: &mut Transaction,
     lease: &Lease,
-    (filmed, folder, files): (&Filmed, &str, &[BlobFile]),
+    outcome: &Outcome,
+    sample: &SampleFootage,
     now_ms: i64,
 ) -> Result<(), Error> {
-    let video = files.iter().find(|file| file.name == VIDEO);
+    let video = outcome.files.iter().find(|file| file.name == VIDEO);
     let video = video.ok_or_else(|| io::Error::other("the sample job produced no video"))?;
     let added = sql::query(
         "insert into footage (id, job_id, fence, folder, sha256, background_sha256, name, size_bytes, width, \
@@ -192,20 +176,22 @@ pub(super) async fn insert_filmed(
     .bind(lease.result_id)
     .bind(lease.job_id.0)
     .bind(lease.fence)
-    .bind(folder)
+    .bind(&outcome.folder)
     .bind(&video.sha256)
     .bind(&b""[..])
-    .bind(filmed.name)
+    .bind(sample.name)
     .bind(video.size_bytes)
-    .bind(i64::from(filmed.width))
-    .bind(i64::from(filmed.height))
-    .bind(filmed.fps)
-    .bind(i64::try_from(filmed.n_frames).unwrap_or(i64::MAX))
+    .bind(i64::from(sample.width))
+    .bind(i64::from(sample.height))
+    .bind(sample.fps)
+    .bind(i64::try_from(sample.n_frames).unwrap_or(i64::MAX))
     .bind(now_ms)
     .execute(transaction)
     .await;
     match added {
-        Err(sqlx::Error::Database(error)) if error.is_unique_violation() => Err(Error::FilmIsKnown),
+        Err(sqlx::Error::Database(error)) if error.is_unique_violation() => {
+            Err(Error::AlreadyStored)
+        }
         added => Ok(added.map(drop)?),
     }
 }
@@ -255,7 +241,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_film_whose_commit_was_made_keeps_its_folder_although_the_answer_was_lost() {
+    async fn committed_footage_keeps_its_folder_after_a_lost_reply() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let film = footage(1);
@@ -266,7 +252,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_folder_of_which_nobody_knows_is_left_to_the_sweep() {
+    async fn folder_with_unknown_outcome_is_left_to_the_sweep() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let film = footage(1);
@@ -276,7 +262,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn of_the_same_bytes_twice_at_once_one_folder_stays() {
+    async fn concurrent_uploads_of_the_same_bytes_leave_one_folder() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let (first, second) = (footage(1), footage(1));

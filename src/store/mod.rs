@@ -9,14 +9,12 @@ pub mod blobs;
 pub mod check;
 pub mod delete;
 pub mod error;
-pub mod fish;
-pub mod flocks;
 pub mod footage;
 pub mod idempotency;
 pub mod intake;
 pub mod jobs;
-pub mod libraries;
 pub mod owners;
+pub mod resources;
 pub mod spill;
 mod sql;
 pub mod tls;
@@ -46,7 +44,7 @@ pub struct Store {
     reader: Pool,
     reserve: Reserve,
     blobs: Blobs,
-    holders: uploads::Holders,
+    upload_locks: uploads::UploadLocks,
     /// Locks held while the store is open. They guarantee that no other process serves the same folder. Empty
     /// if this process opened the store beside another one.
     locks: Arc<Vec<File>>,
@@ -58,7 +56,7 @@ impl Store {
     /// schema.
     ///
     /// Fails with [`Error::InUse`] if another process serves the same data folder or database file, and with
-    /// [`Error::OtherFiles`] if the files belong to another database.
+    /// [`Error::ForeignFiles`] if the files belong to another database.
     pub async fn open(storage: impl Into<Storage>) -> Result<Store, Error> {
         let storage = storage.into();
         std::fs::create_dir_all(&storage.data)?;
@@ -109,11 +107,11 @@ impl Store {
             reader,
             reserve,
             blobs,
-            holders: uploads::Holders::default(),
+            upload_locks: uploads::UploadLocks::default(),
             locks: Arc::new(locks),
             is_alone,
         };
-        store.own_files().await?;
+        store.check_identity().await?;
         Ok(store)
     }
 
@@ -152,7 +150,7 @@ impl Store {
     pub async fn close(&self) {
         self.reader.close().await;
         self.writer.close().await;
-        self.blobs.work().close();
+        self.blobs.drafts().close();
     }
 
     /// Begins a transaction that adds rows. Fails if the disk has no space left besides the reserve. A
@@ -165,7 +163,7 @@ impl Store {
 
 fn lock(path: &Path) -> Result<File, Error> {
     let file = File::create(path)?;
-    match try_for_a_moment(&file) {
+    match try_lock_briefly(&file) {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => {
             let folder = path.parent().unwrap_or(path);
@@ -177,7 +175,7 @@ fn lock(path: &Path) -> Result<File, Error> {
 
 /// Tries to lock the file for up to 0.3 s. A killed server's child process inherits the server's locks and
 /// keeps them until it executes another program.
-fn try_for_a_moment(file: &File) -> Result<(), TryLockError> {
+fn try_lock_briefly(file: &File) -> Result<(), TryLockError> {
     for _ in 0..10 {
         match file.try_lock() {
             Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(30)),

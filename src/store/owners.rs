@@ -26,48 +26,55 @@ impl Store {
     }
 }
 
-/// Queries restricted to visible rows.
+/// Queries restricted to visible rows. `select` names its table `r` and has no condition.
 impl Store {
-    /// Returns the row that `sql` selects: `$1` is the id, `$2` the owner (null = all owners).
-    pub(super) async fn one_of<T: sql::Row>(
+    /// Returns the row with this value in `column`.
+    pub(super) async fn visible_row<T: sql::Row>(
         &self,
-        sql: &'static str,
+        select: &str,
+        column: &str,
         id: Uuid,
-        reach: &Reach,
+        owners: &OwnerFilter,
     ) -> Result<Option<T>, Error> {
-        let row = sql::query(sql).bind(id).bind(reach.owner());
+        let filter = format!("where r.{column} = $1 and ($2 is null or r.owner = $2)");
+        let row = sql::query(format!("{select} {filter}")).bind(id);
+        let row = row.bind(owners.parameter());
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
-    /// Returns the rows that `sql` selects: only ids less than `$1` (null = no limit), at most `$2` rows, of
-    /// the owner `$3` (null = all owners).
-    pub(super) async fn newest_of<T: sql::Row>(
+    /// Returns the newest rows with ids less than `before`, at most `limit`.
+    pub(super) async fn newest_visible_rows<T: sql::Row>(
         &self,
-        sql: &'static str,
+        select: &str,
         limit: i64,
         before: Option<Uuid>,
-        reach: &Reach,
+        owners: &OwnerFilter,
     ) -> Result<Vec<T>, Error> {
-        let rows = sql::query(sql).bind(before).bind(limit);
-        Ok(rows.bind(reach.owner()).fetch_all(&self.reader).await?)
+        let filter = "where ($1 is null or r.id < $1) and ($3 is null or r.owner = $3) \
+                      order by r.id desc limit $2";
+        let rows = sql::query(format!("{select} {filter}"))
+            .bind(before)
+            .bind(limit);
+        let rows = rows.bind(owners.parameter());
+        Ok(rows.fetch_all(&self.reader).await?)
     }
 }
 
 /// The owners whose rows are visible to a query.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Reach {
+pub enum OwnerFilter {
     /// All owners: for administrators and workers.
     All,
     /// One owner. Rows of others appear not to exist.
-    Of(Owner),
+    One(Owner),
 }
 
-impl Reach {
+impl OwnerFilter {
     /// Returns the parameter for `$n is null or owner = $n`.
-    pub(super) fn owner(&self) -> Option<&str> {
+    pub(super) fn parameter(&self) -> Option<&str> {
         match self {
-            Reach::All => None,
-            Reach::Of(Owner(name)) => Some(name),
+            OwnerFilter::All => None,
+            OwnerFilter::One(Owner(name)) => Some(name),
         }
     }
 }

@@ -18,11 +18,11 @@ use tokio_util::sync::CancellationToken;
 
 use super::blobs::hash_file;
 use super::footage::VIDEO;
-use super::owners::{Owner, Reach};
+use super::owners::{Owner, OwnerFilter};
 use super::{BlobFile, Draft, Error, Store, sql};
 
 /// Lifetime of an unfinished upload after its last bytes, milliseconds. Free choice.
-pub const LIFE_MS: i64 = 24 * 3600 * 1000;
+pub const LIFETIME_MS: i64 = 24 * 3600 * 1000;
 
 /// One stored upload.
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
@@ -45,25 +45,25 @@ pub struct Upload {
 
 /// The requests that hold or wait for an upload, by upload.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Holders(Arc<Mutex<HashMap<Uuid, Holder>>>);
+pub(super) struct UploadLocks(Arc<Mutex<HashMap<Uuid, LockState>>>);
 
 #[derive(Clone, Debug, Default)]
-struct Holder {
-    wanted: CancellationToken,
+struct LockState {
+    requested: CancellationToken,
     mutex: Arc<tokio::sync::Mutex<()>>,
 }
 
 /// Exclusive right to change an upload. Dropping it releases the upload.
 #[derive(Debug)]
-pub struct Hold {
+pub struct UploadLock {
     /// Cancelled when another request wants the upload. The holder must then stop.
-    pub wanted: CancellationToken,
+    pub requested: CancellationToken,
     _guard: OwnedMutexGuard<()>,
 }
 
 /// The file of an upload, open for appending.
 #[derive(Debug)]
-pub struct Growing {
+pub struct UploadFile {
     file: File,
 }
 
@@ -91,46 +91,43 @@ impl Store {
     pub async fn upload(
         &self,
         id: Uuid,
-        reach: &Reach,
+        owners: &OwnerFilter,
         now_ms: i64,
     ) -> Result<Option<Upload>, Error> {
         let sql = "select * from uploads where id = $1 and expires_ms > $2 \
                    and ($3 is null or owner = $3)";
         let row = sql::query(sql).bind(id).bind(now_ms);
-        let row = row.bind(reach.owner());
+        let row = row.bind(owners.parameter());
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
     /// Asks the current holder to stop, waits for it, and returns the exclusive right.
-    pub async fn hold_upload(&self, id: Uuid) -> Hold {
-        let (wanted, mutex) = {
-            let mut holders = self
-                .holders
-                .0
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner);
+    pub async fn lock_upload(&self, id: Uuid) -> UploadLock {
+        let (requested, mutex) = {
+            let locks = &self.upload_locks.0;
+            let mut locks = locks.lock().unwrap_or_else(PoisonError::into_inner);
             // Removes entries that no request holds or waits for.
-            holders.retain(|of, holder| *of == id || Arc::strong_count(&holder.mutex) > 1);
-            let holder = holders.entry(id).or_default();
-            holder.wanted.cancel();
-            holder.wanted = CancellationToken::new();
-            (holder.wanted.clone(), holder.mutex.clone())
+            locks.retain(|other, lock| *other == id || Arc::strong_count(&lock.mutex) > 1);
+            let lock = locks.entry(id).or_default();
+            lock.requested.cancel();
+            lock.requested = CancellationToken::new();
+            (lock.requested.clone(), lock.mutex.clone())
         };
         let _guard = mutex.lock_owned().await;
-        Hold { wanted, _guard }
+        UploadLock { requested, _guard }
     }
 
     /// Opens the file of an upload for appending after its confirmed bytes. Unconfirmed bytes are cut off.
-    pub async fn grow_upload(&self, upload: &Upload) -> Result<Growing, Error> {
+    pub async fn open_upload_file(&self, upload: &Upload) -> Result<UploadFile, Error> {
         let path = self.upload_path(upload.id);
         let mut file = OpenOptions::new().write(true).open(path).await?;
         file.set_len(upload.offset_bytes.unsigned_abs()).await?;
         file.seek(SeekFrom::End(0)).await?;
-        Ok(Growing { file })
+        Ok(UploadFile { file })
     }
 
     /// Records the number of synced bytes and the new expiry time.
-    pub async fn note_upload(&self, upload: &Upload) -> Result<(), Error> {
+    pub async fn record_upload_offset(&self, upload: &Upload) -> Result<(), Error> {
         let sql = "update uploads set offset_bytes = $2, expires_ms = $3 where id = $1";
         let update = sql::query(sql).bind(upload.id).bind(upload.offset_bytes);
         update.bind(upload.expires_ms).execute(&self.writer).await?;
@@ -141,26 +138,23 @@ impl Store {
     /// own file.
     pub async fn draft_of_upload(&self, upload: &Upload) -> Result<(Draft, BlobFile), Error> {
         let (blobs, path) = (self.blobs.clone(), self.upload_path(upload.id));
-        let made = tokio::task::spawn_blocking(move || {
+        let draft = tokio::task::spawn_blocking(move || {
             let draft = blobs.draft(&Uuid::now_v7().to_string())?;
             let video = draft.path().join(VIDEO);
             link(&path, &video)?;
             let (size_bytes, sha256) = hash_file(&video)?;
-            let name = VIDEO.to_owned();
-            Ok((
-                draft,
-                BlobFile {
-                    name,
-                    size_bytes,
-                    sha256,
-                },
-            ))
+            let file = BlobFile {
+                name: VIDEO.to_owned(),
+                size_bytes,
+                sha256,
+            };
+            Ok((draft, file))
         });
-        made.await.map_err(std::io::Error::other)?
+        draft.await.map_err(std::io::Error::other)?
     }
 
     /// Records the footage made of the upload, and removes the upload's file.
-    pub async fn end_upload(&self, upload: &Upload, footage: Uuid) -> Result<(), Error> {
+    pub async fn finish_upload(&self, upload: &Upload, footage: Uuid) -> Result<(), Error> {
         let update = sql::query("update uploads set footage_id = $2 where id = $1");
         let update = update.bind(upload.id).bind(footage);
         update.execute(&self.writer).await?;
@@ -229,9 +223,9 @@ fn link(file: &Path, name: &Path) -> std::io::Result<()> {
     }
 }
 
-impl Growing {
+impl UploadFile {
     /// Appends bytes.
-    pub async fn add(&mut self, bytes: &[u8]) -> Result<(), Error> {
+    pub async fn append(&mut self, bytes: &[u8]) -> Result<(), Error> {
         Ok(self.file.write_all(bytes).await?)
     }
 

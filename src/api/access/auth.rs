@@ -2,127 +2,25 @@
 //! (docs/explanation/promises.md, "Owners are isolated"). Only the page, its documentation, the probes and
 //! signing in are open to all.
 //!
-//! On loopback a request without a token belongs to the local owner, unless tokens are required. The caller
-//! is the only source of the data that a handler may read and of the account that it charges.
+//! On loopback a request without a token belongs to the local owner, unless tokens are required.
 
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Instant;
 
-use axum::extract::{FromRequestParts, Request, State};
+use axum::extract::{Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
-use super::link::caller_of_link;
-use super::session::cookie;
+use super::caller::{Caller, Proof};
+use super::cookie::session_cookie;
+use super::link::link_caller;
 use crate::api::{AppState, Problem};
 use crate::code::Code;
 use crate::jobs::clock::now_ms;
-use crate::store::owners::{Account, Owner, Reach};
 use crate::store::tokens::secret::Presented;
 use crate::store::tokens::{Scope, Token};
-
-/// The authenticated sender of a request. Every handler that reads or writes data of an owner takes it.
-#[derive(Clone, Debug)]
-pub(in crate::api) struct Caller {
-    /// Owners whose data this request can access.
-    pub reach: Reach,
-    /// Owner and quota of everything that this request creates.
-    pub account: Account,
-    scope: Scope,
-    proof: Proof,
-}
-
-/// Credential of a caller. Long responses check it again while they run.
-#[derive(Clone)]
-enum Proof {
-    /// None: a local request.
-    Nothing,
-    /// A signed link.
-    Link,
-    /// A token.
-    Token(Presented),
-    /// The session cookie of a browser.
-    Cookie(String),
-}
-
-impl std::fmt::Debug for Proof {
-    /// Writes only the kind of credential, because secrets must not get into logs.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Proof::Nothing => "nothing",
-            Proof::Link => "link",
-            Proof::Token(_) => "token",
-            Proof::Cookie(_) => "cookie",
-        })
-    }
-}
-
-impl Caller {
-    /// Returns the caller of a local request without a token.
-    fn local() -> Caller {
-        Caller {
-            reach: Reach::Of(Owner::local()),
-            account: Account::local(),
-            scope: Scope::Write,
-            proof: Proof::Nothing,
-        }
-    }
-
-    /// Returns the caller of a signed link to data of `owner`. The caller can only read. `link` has checked
-    /// that the signature covers the path of the request.
-    pub(super) fn of_link(owner: Owner) -> Caller {
-        Caller {
-            reach: Reach::Of(owner),
-            account: Account {
-                owner: Owner("link".to_owned()),
-                quota: Some(0),
-            },
-            scope: Scope::Read,
-            proof: Proof::Link,
-        }
-    }
-
-    fn of(token: &Token, proof: Proof) -> Caller {
-        Caller {
-            reach: token.reach(),
-            account: token.account(),
-            scope: token.scope,
-            proof,
-        }
-    }
-
-    /// Returns whether the caller may read the metrics of the service: a local request without a token, or an
-    /// administrator.
-    pub(in crate::api) fn runs_the_service(&self) -> bool {
-        matches!(self.proof, Proof::Nothing) || self.scope == Scope::Admin
-    }
-
-    /// Returns whether the credential is still valid: the token has not expired or been revoked, and the
-    /// session has not ended. Returns false if the store cannot tell.
-    pub(in crate::api) async fn is_still_good(&self, state: &AppState) -> bool {
-        let store = &state.context.store;
-        let token = match &self.proof {
-            Proof::Nothing | Proof::Link => return true,
-            Proof::Token(given) => store.token(given, now_ms()).await,
-            Proof::Cookie(cookie) => store.token_of_session(cookie, now_ms()).await,
-        };
-        matches!(token, Ok(Some(_)))
-    }
-}
-
-impl<S: Send + Sync> FromRequestParts<S> for Caller {
-    type Rejection = Problem;
-
-    async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Caller, Problem> {
-        let caller = parts.extensions.get::<Caller>().cloned();
-        caller.ok_or_else(|| {
-            tracing::error!("an open route requires a caller: the route table is wrong");
-            Code::Internal.into()
-        })
-    }
-}
 
 /// Address of the other end of the connection. Behind a proxy, it is the address of the proxy.
 #[derive(Clone, Copy, Debug)]
@@ -136,16 +34,16 @@ pub(in crate::api) async fn authenticate(
     next: Next,
 ) -> Response {
     let peer = request.extensions().get::<Peer>().copied();
-    let answer = let_in(&state, request, next).await;
+    let answer = run_authenticated(&state, request, next).await;
     let Peer(peer) = peer.unwrap_or(Peer(Ipv4Addr::UNSPECIFIED.into()));
     let is_refused = answer.status() == StatusCode::UNAUTHORIZED;
-    match is_refused && !state.rates.take_refusal(peer, Instant::now()) {
-        true => Problem::from(Code::RateLimited).into_response(),
-        false => answer,
+    if is_refused && !state.rates.take_refusal(peer, Instant::now()) {
+        return Problem::from(Code::RateLimited).into_response();
     }
+    answer
 }
 
-async fn let_in(state: &AppState, request: Request, next: Next) -> Response {
+async fn run_authenticated(state: &AppState, request: Request, next: Next) -> Response {
     if is_open(request.uri().path()) {
         return next.run(request).await;
     }
@@ -181,10 +79,10 @@ async fn caller(state: &AppState, parts: &Parts) -> Result<Caller, Problem> {
     let (method, headers) = (&parts.method, &parts.headers);
     let caller = match bearer(headers) {
         Some(text) => {
-            let (token, given) = presented(state, text).await?;
-            Caller::of(&token, Proof::Token(given))
+            let (token, given) = presented_token(state, text).await?;
+            Caller::with_token(&token, Proof::Token(given))
         }
-        None => match of_browser(state, parts).await? {
+        None => match browser_caller(state, parts).await? {
             Some(caller) => caller,
             None if state.config.requires_tokens() => return Err(Code::Unauthenticated.into()),
             None => Caller::local(),
@@ -197,19 +95,19 @@ async fn caller(state: &AppState, parts: &Parts) -> Result<Caller, Problem> {
 }
 
 /// Returns the caller of a signed link or a session cookie, if there is one.
-async fn of_browser(state: &AppState, parts: &Parts) -> Result<Option<Caller>, Problem> {
-    match caller_of_link(state, &parts.method, &parts.uri).await? {
-        None => of_session(state, &parts.method, &parts.headers).await,
+async fn browser_caller(state: &AppState, parts: &Parts) -> Result<Option<Caller>, Problem> {
+    match link_caller(state, &parts.method, &parts.uri).await? {
+        None => session_caller(state, &parts.method, &parts.headers).await,
         caller => Ok(caller),
     }
 }
 
 /// Returns the valid token that `text` represents. Fails with `unauthenticated`.
-pub(super) async fn token(state: &AppState, text: &str) -> Result<Token, Problem> {
-    presented(state, text).await.map(|(token, _)| token)
+pub(super) async fn valid_token(state: &AppState, text: &str) -> Result<Token, Problem> {
+    presented_token(state, text).await.map(|(token, _)| token)
 }
 
-async fn presented(state: &AppState, text: &str) -> Result<(Token, Presented), Problem> {
+async fn presented_token(state: &AppState, text: &str) -> Result<(Token, Presented), Problem> {
     let refused = || Problem::from(Code::Unauthenticated);
     let given = Presented::parse(text).ok_or_else(refused)?;
     let token = state.context.store.token(&given, now_ms()).await?;
@@ -219,24 +117,27 @@ async fn presented(state: &AppState, text: &str) -> Result<(Token, Presented), P
 /// Returns the caller of a session cookie, if there is one. A browser also adds the cookie to requests of
 /// other sites, but then names the site. A write therefore fails with `cross_site` unless it names its
 /// origin, which `guard` has checked.
-async fn of_session(
+async fn session_caller(
     state: &AppState,
     method: &Method,
     headers: &HeaderMap,
 ) -> Result<Option<Caller>, Problem> {
-    let Some(cookie) = cookie(headers) else {
+    let Some(cookie) = session_cookie(headers) else {
         return Ok(None);
     };
     let token = state.context.store.token_of_session(cookie, now_ms());
     let Some(token) = token.await? else {
         return Ok(None);
     };
-    let says_from_where = headers.contains_key(header::ORIGIN)
+    let names_origin = headers.contains_key(header::ORIGIN)
         || headers.contains_key(HeaderName::from_static("sec-fetch-site"));
-    if !method.is_safe() && !says_from_where {
+    if !method.is_safe() && !names_origin {
         return Err(Code::CrossSite.into());
     }
-    Ok(Some(Caller::of(&token, Proof::Cookie(cookie.to_owned()))))
+    Ok(Some(Caller::with_token(
+        &token,
+        Proof::Cookie(cookie.to_owned()),
+    )))
 }
 
 /// Returns the text after `Bearer`. Other schemes are ignored, because they may be meant for a proxy.
@@ -251,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_named_is_closed() {
+    fn paths_not_listed_need_a_caller() {
         for path in [
             "/",
             "/static/js/main.js",
@@ -274,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_bearer_scheme_is_ours() {
+    fn other_schemes_than_bearer_are_ignored() {
         let of = |value: &'static str| {
             let value = axum::http::HeaderValue::from_static(value);
             let headers = HeaderMap::from_iter([(header::AUTHORIZATION, value)]);

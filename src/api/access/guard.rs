@@ -48,7 +48,7 @@ const MAX_FIELDS_BYTES: usize = 32 << 10;
 
 /// Host names that requests may use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::api) enum Names {
+pub(in crate::api) enum HostNames {
     /// Only loopback names. Local requests need no token, so a foreign host name that resolves to this
     /// machine (DNS rebinding) must be refused.
     Loopback,
@@ -58,7 +58,7 @@ pub(in crate::api) enum Names {
 
 /// Middleware: refuses cross-site and oversized requests, and sets the security headers of the response.
 pub(in crate::api) async fn guard(
-    State(names): State<Names>,
+    State(names): State<HostNames>,
     request: Request,
     next: Next,
 ) -> Response {
@@ -79,7 +79,7 @@ pub(in crate::api) async fn guard(
 
 /// Checks sizes, encoding, host name and origin of a request. A write must come from this service's own page,
 /// or from a client that is no web page.
-fn check(names: Names, method: &Method, uri: &Uri, headers: &HeaderMap) -> Result<(), Problem> {
+fn check(names: HostNames, method: &Method, uri: &Uri, headers: &HeaderMap) -> Result<(), Problem> {
     let address = uri.path_and_query().map_or("", |address| address.as_str());
     if address.len() > MAX_ADDRESS_BYTES {
         return Err(Code::AddressTooLong.into());
@@ -98,7 +98,7 @@ fn check(names: Names, method: &Method, uri: &Uri, headers: &HeaderMap) -> Resul
     }
     let text = |name: HeaderName| headers.get(name).and_then(|value| value.to_str().ok());
     let host = text(header::HOST).or(uri.authority().map(|authority| authority.as_str()));
-    if names == Names::Loopback && !host.is_some_and(is_loopback) {
+    if names == HostNames::Loopback && !host.is_some_and(is_loopback) {
         let sentence = "the host name of the request is not a loopback name: use localhost or 127.0.0.1, or start the \
                         service with `--auth required`";
         return Err(Problem::new(Code::CrossSite, sentence));
@@ -108,12 +108,12 @@ fn check(names: Names, method: &Method, uri: &Uri, headers: &HeaderMap) -> Resul
     }
     let site = text(HeaderName::from_static("sec-fetch-site"));
     let origin = text(header::ORIGIN).and_then(|origin| origin.split_once("://"));
-    let is_ours = site.is_none_or(|site| site == "same-origin" || site == "none")
-        && match (headers.contains_key(header::ORIGIN), origin) {
-            (false, _) => true,
-            (true, origin) => origin.map(|(_, authority)| authority) == host,
-        };
-    is_ours.then_some(()).ok_or_else(|| Code::CrossSite.into())
+    let is_same_site = site.is_none_or(|site| site == "same-origin" || site == "none")
+        && (!headers.contains_key(header::ORIGIN)
+            || origin.map(|(_, authority)| authority) == host);
+    is_same_site
+        .then_some(())
+        .ok_or_else(|| Code::CrossSite.into())
 }
 
 fn is_loopback(host: &str) -> bool {
@@ -132,16 +132,22 @@ fn is_loopback(host: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn asks(method: Method, headers: &[(HeaderName, &'static str)]) -> bool {
+    fn is_accepted(method: Method, headers: &[(HeaderName, &'static str)]) -> bool {
         let headers = headers
             .iter()
             .map(|(name, value)| (name.clone(), HeaderValue::from_static(value)))
             .collect();
-        check(Names::Loopback, &method, &Uri::from_static("/"), &headers).is_ok()
+        check(
+            HostNames::Loopback,
+            &method,
+            &Uri::from_static("/"),
+            &headers,
+        )
+        .is_ok()
     }
 
     #[test]
-    fn only_names_of_this_machine_are_answered() {
+    fn only_loopback_names_are_accepted() {
         for host in [
             "localhost",
             "LOCALHOST:8080",
@@ -149,21 +155,22 @@ mod tests {
             "[::1]:8080",
             "[::1]",
         ] {
-            assert!(asks(Method::GET, &[(header::HOST, host)]), "{host}");
+            assert!(is_accepted(Method::GET, &[(header::HOST, host)]), "{host}");
         }
         for host in ["evil.example", "localhost.evil.example:80", "10.0.0.1", ""] {
-            assert!(!asks(Method::GET, &[(header::HOST, host)]), "{host}");
+            assert!(!is_accepted(Method::GET, &[(header::HOST, host)]), "{host}");
         }
-        assert!(!asks(Method::GET, &[]));
+        assert!(!is_accepted(Method::GET, &[]));
     }
 
     #[test]
-    fn a_write_from_another_site_is_refused() {
+    fn cross_site_write_is_refused() {
         let host = (header::HOST, "localhost:8080");
         let site = HeaderName::from_static("sec-fetch-site");
-        let with =
-            |name: &HeaderName, value| asks(Method::POST, &[host.clone(), (name.clone(), value)]);
-        assert!(asks(Method::POST, std::slice::from_ref(&host)));
+        let with = |name: &HeaderName, value| {
+            is_accepted(Method::POST, &[host.clone(), (name.clone(), value)])
+        };
+        assert!(is_accepted(Method::POST, std::slice::from_ref(&host)));
         assert!(with(&header::ORIGIN, "http://localhost:8080"));
         assert!(with(&site, "same-origin"));
         assert!(!with(&header::ORIGIN, "http://localhost:9090"));

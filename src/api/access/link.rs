@@ -7,7 +7,7 @@
 use axum::http::{Method, Uri};
 use uuid::Uuid;
 
-use super::Caller;
+use super::caller::Caller;
 use crate::api::{AppState, Problem};
 use crate::jobs::clock::now_ms;
 use crate::store::blobs::hex;
@@ -21,7 +21,7 @@ pub fn signed(key: &[u8], path: &str, expires_s: i64) -> String {
 
 /// Returns the caller of a valid signed link, which can only read the path of the link. Returns `None` for a
 /// request without a link, or with an invalid or expired one.
-pub(super) async fn caller_of_link(
+pub(super) async fn link_caller(
     state: &AppState,
     method: &Method,
     uri: &Uri,
@@ -41,7 +41,7 @@ pub(super) async fn caller_of_link(
         return Ok(None);
     };
     let owner = state.context.store.owner_of_flock(flock).await?;
-    Ok(owner.map(Caller::of_link))
+    Ok(owner.map(Caller::with_link))
 }
 
 /// Returns the flock that a path belongs to.

@@ -20,15 +20,27 @@ const BURST_S: f64 = 4.0;
 const MAX_BUCKETS: usize = 10_000;
 
 /// Refused requests that an address may make at once, and per second. Free choice.
-const REFUSALS: (f64, f64) = (30.0, 1.0);
+const REFUSALS: Limit = Limit {
+    burst: 30.0,
+    per_s: 1.0,
+};
 
 /// Buckets of all owners, and of all addresses with refused requests.
 #[derive(Debug)]
 pub(in crate::api) struct Rates {
     /// Requests per second of each owner; 0 = no limit.
     per_s: f64,
-    of_owners: Buckets<Owner>,
-    of_strangers: Buckets<IpAddr>,
+    owners: Buckets<Owner>,
+    refused_addresses: Buckets<IpAddr>,
+}
+
+/// Size and refill rate of a bucket.
+#[derive(Clone, Copy, Debug)]
+struct Limit {
+    /// Requests at once.
+    burst: f64,
+    /// Requests per second.
+    per_s: f64,
 }
 
 #[derive(Debug)]
@@ -45,8 +57,8 @@ impl Rates {
     pub(in crate::api) fn new(per_s: u32) -> Rates {
         Rates {
             per_s: f64::from(per_s),
-            of_owners: Buckets(Mutex::default()),
-            of_strangers: Buckets(Mutex::default()),
+            owners: Buckets(Mutex::default()),
+            refused_addresses: Buckets(Mutex::default()),
         }
     }
 
@@ -56,8 +68,11 @@ impl Rates {
         if self.per_s == 0.0 || account.quota.is_none() {
             return true;
         }
-        let full = self.per_s * BURST_S;
-        self.of_owners.take(&account.owner, (full, self.per_s), now)
+        let limit = Limit {
+            burst: self.per_s * BURST_S,
+            per_s: self.per_s,
+        };
+        self.owners.take(&account.owner, limit, now)
     }
 
     /// Takes one refusal from the bucket of an address. Returns false if the bucket is empty. Requests with a
@@ -68,21 +83,21 @@ impl Rates {
             IpAddr::V4(_) => peer,
             IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() >> 64 << 64).into(),
         };
-        self.of_strangers.take(&network, REFUSALS, now)
+        self.refused_addresses.take(&network, REFUSALS, now)
     }
 }
 
 impl<Key: Clone + Eq + Hash> Buckets<Key> {
-    fn take(&self, key: &Key, (full, per_s): (f64, f64), now: Instant) -> bool {
+    fn take(&self, key: &Key, limit: Limit, now: Instant) -> bool {
         let filled = |bucket: &Bucket| {
             let passed_s = now.saturating_duration_since(bucket.at).as_secs_f64();
-            full.min(bucket.n_left + passed_s * per_s)
+            limit.burst.min(bucket.n_left + passed_s * limit.per_s)
         };
         let mut buckets = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if buckets.len() >= MAX_BUCKETS {
-            buckets.retain(|_, bucket| filled(bucket) < full);
+            buckets.retain(|_, bucket| filled(bucket) < limit.burst);
         }
-        let n_left = buckets.get(key).map_or(full, filled);
+        let n_left = buckets.get(key).map_or(limit.burst, filled);
         let taken = n_left >= 1.0;
         let n_left = if taken { n_left - 1.0 } else { n_left };
         buckets.insert(key.clone(), Bucket { n_left, at: now });
@@ -97,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_burst_is_answered_and_then_the_steady_rate() {
+    fn owner_gets_a_burst_and_then_the_steady_rate() {
         let (rates, start) = (Rates::new(5), Instant::now());
         let of = |name: &str| Account {
             owner: Owner(name.to_owned()),
@@ -120,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_of_zero_bounds_nobody_and_no_rate_bounds_this_machine() {
+    fn rate_zero_and_local_requests_have_no_limit() {
         let (now, local) = (Instant::now(), Account::local());
         let bounded = Account {
             quota: Some(1),
@@ -132,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_is_refused_thirty_times_and_then_once_a_second() {
+    fn address_has_thirty_refusals_and_then_one_per_second() {
         let (rates, start) = (Rates::new(0), Instant::now());
         let n_taken = |peer: &str, after_s: u64| {
             let now = start + Duration::from_secs(after_s);

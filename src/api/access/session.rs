@@ -9,7 +9,8 @@ use axum::response::{AppendHeaders, IntoResponse};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::auth::token;
+use super::auth::valid_token;
+use super::cookie::{HTTP_NAME, HTTPS_NAME, session_cookie};
 use crate::api::AppState;
 use crate::api::extract::Json;
 use crate::api::problem::{Problem, ProblemBody};
@@ -18,10 +19,6 @@ use crate::jobs::clock::now_ms;
 
 /// Longest session, ms: one week. Free choice.
 const SESSION_MS: i64 = 7 * 24 * 3600 * 1000;
-/// Name of the cookie over HTTP, and over HTTPS. Browsers accept a `__Host-` cookie only over HTTPS and only
-/// for the exact host.
-const NAMES: [&str; 2] = ["flockreel_session", "__Host-flockreel_session"];
-
 /// Token to sign in with.
 #[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
@@ -54,7 +51,7 @@ pub(in crate::api) async fn begin_session(
     headers: HeaderMap,
     Json(request): Json<SessionRequest>,
 ) -> Result<Response<Body>, Problem> {
-    let token = token(&state, request.token.trim()).await?;
+    let token = valid_token(&state, request.token.trim()).await?;
     let now_ms = now_ms();
     let latest_ms = now_ms + SESSION_MS;
     let expires_ms = token
@@ -63,9 +60,10 @@ pub(in crate::api) async fn begin_session(
     let store = &state.context.store;
     let secret = store.begin_session(&token.id, now_ms, expires_ms).await?;
     let is_https = (headers.get("x-forwarded-proto")).is_some_and(|scheme| scheme == "https");
-    let (name, secure) = match is_https {
-        true => (NAMES[1], "; Secure"),
-        false => (NAMES[0], ""),
+    let (name, secure) = if is_https {
+        (HTTPS_NAME, "; Secure")
+    } else {
+        (HTTP_NAME, "")
     };
     let lasts_s = (expires_ms - now_ms) / 1000;
     let cookie =
@@ -94,24 +92,13 @@ pub(in crate::api) async fn end_session(
     State(state): State<AppState>,
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
-    if let Some(cookie) = cookie(&headers) {
+    if let Some(cookie) = session_cookie(&headers) {
         state.context.store.end_session(cookie).await?;
     }
-    let gone = |name: &str, more| {
+    let deleted = |name: &str, more| {
         let cookie = format!("{name}=; Path=/; HttpOnly; SameSite=Strict; Max-Age=0{more}");
         (header::SET_COOKIE, cookie)
     };
-    let cookies = AppendHeaders([gone(NAMES[0], ""), gone(NAMES[1], "; Secure")]);
+    let cookies = AppendHeaders([deleted(HTTP_NAME, ""), deleted(HTTPS_NAME, "; Secure")]);
     Ok((StatusCode::NO_CONTENT, cookies).into_response())
-}
-
-/// Returns the value of the session cookie, if the request has one.
-pub(super) fn cookie(headers: &HeaderMap) -> Option<&str> {
-    let values = headers.get_all(header::COOKIE).into_iter();
-    let pairs = values
-        .filter_map(|value| value.to_str().ok())
-        .flat_map(|text| text.split(';'));
-    let mut named = pairs.filter_map(|pair| pair.trim().split_once('='));
-    let found = named.find(|(name, _)| NAMES.contains(name));
-    found.map(|(_, value)| value)
 }

@@ -11,7 +11,6 @@ use std::convert::Infallible;
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::extract::State;
 use axum::http::{HeaderMap, Response};
 use axum::response::IntoResponse;
 use axum::response::sse::{Event, KeepAlive, Sse};
@@ -21,23 +20,21 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{JobView, find, is_final};
-use crate::api::AppState;
-use crate::api::access::Caller;
-use crate::api::extract::Id;
-use crate::api::problem::{Problem, ProblemBody};
+use crate::api::extract::{Access, Id};
+use crate::api::problem::{Answer, ProblemBody};
 use crate::ids::JobId;
 use crate::jobs::clock::now_ms;
 use crate::store;
 use crate::store::jobs::read::JobRow;
 
 /// Interval between two queries of a stream: as often as workers store progress.
-const LOOK: Duration = Duration::from_millis(500);
+const POLL_INTERVAL: Duration = Duration::from_millis(500);
 /// Overlap of successive queries, ms, for changes that were written late. Free choice.
 const OVERLAP_MS: i64 = 10_000;
 /// Longest interruption of a stream after which missed changes are still sent, ms. Free choice.
-const LOOK_BACK_MS: i64 = 3_600_000;
+const MAX_RESUME_MS: i64 = 3_600_000;
 /// Time after which a client should reconnect. Free choice.
-const RETRY: Duration = Duration::from_secs(1);
+const RECONNECT_DELAY: Duration = Duration::from_secs(1);
 
 /// Data of an event `gone`: the job was deleted with its result.
 #[derive(ToSchema)]
@@ -78,25 +75,20 @@ pub(in crate::api) struct JobEvent {
     (status = 200, content_type = "text/event-stream", body = JobEvent),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(in crate::api) async fn get_events(
-    State(state): State<AppState>,
-    caller: Caller,
-    headers: HeaderMap,
-) -> Response<Body> {
+pub(in crate::api) async fn get_events(access: Access, headers: HeaderMap) -> Response<Body> {
     let last = headers.get("last-event-id");
     let last_ms = last.and_then(|id| id.to_str().ok()?.parse().ok());
-    let last_ms = last_ms.map(|id_ms| within_look_back(id_ms, now_ms()));
-    let feed = Feed {
-        state,
-        caller,
+    let last_ms = last_ms.map(|id_ms| resume_time(id_ms, now_ms()));
+    let stream = JobStream {
+        access,
         seen: BTreeMap::new(),
-        ready: VecDeque::from([Event::default().retry(RETRY)]),
+        ready: VecDeque::from([Event::default().retry(RECONNECT_DELAY)]),
         last_ms,
-        looked_ms: None,
+        queried_ms: None,
     };
-    answer(unfold(feed, async |mut feed| {
-        let event = feed.next().await?;
-        Some((Ok(event), feed))
+    answer(unfold(stream, async |mut stream| {
+        let event = stream.next().await?;
+        Some((Ok(event), stream))
     }))
 }
 
@@ -108,20 +100,16 @@ pub(in crate::api) async fn get_events(
     (status = 200, content_type = "text/event-stream", body = JobEvent),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(in crate::api) async fn get_job_events(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<Response<Body>, Problem> {
-    let job = find(&state, &caller, JobId(id)).await?;
-    let start = (state, caller, None, Some(job));
-    let events = unfold(start, async |(state, caller, last, first)| {
+pub(in crate::api) async fn get_job_events(access: Access, Id(id): Id) -> Answer {
+    let job = find(&access, JobId(id)).await?;
+    let start = (access, None, Some(job));
+    let events = unfold(start, async |(access, last, first)| {
         let job = match first {
             Some(first) => first,
-            None => next_change(&state, &caller, last.as_ref()?).await?,
+            None => next_change(&access, last.as_ref()?).await?,
         };
         let event = Event::default().event("job").json_data(&job).ok()?;
-        Some((Ok(event), (state, caller, Some(job), None)))
+        Some((Ok(event), (access, Some(job), None)))
     });
     Ok(answer(events))
 }
@@ -136,9 +124,9 @@ where
 }
 
 /// Returns the next state that differs from `last`, or `None` after a final state or if the stream must end.
-async fn next_change(state: &AppState, caller: &Caller, last: &JobView) -> Option<JobView> {
-    while !is_final(last) && wait(state, caller).await {
-        let job = find(state, caller, last.id).await.ok()?;
+async fn next_change(access: &Access, last: &JobView) -> Option<JobView> {
+    while !is_final(last) && wait(access).await {
+        let job = find(access, last.id).await.ok()?;
         if job != *last {
             return Some(job);
         }
@@ -147,18 +135,17 @@ async fn next_change(state: &AppState, caller: &Caller, last: &JobView) -> Optio
 }
 
 /// Waits until the next query is due. Returns false if the stream must end instead.
-async fn wait(state: &AppState, caller: &Caller) -> bool {
-    let draining = &state.context.draining;
+async fn wait(access: &Access) -> bool {
+    let draining = &access.state.context.draining;
     tokio::select! {
-        () = tokio::time::sleep(LOOK) => caller.is_still_good(state).await,
+        () = tokio::time::sleep(POLL_INTERVAL) => access.caller.is_still_valid(&access.state).await,
         () = draining.cancelled() => false,
     }
 }
 
 /// State of a stream of all jobs.
-struct Feed {
-    state: AppState,
-    caller: Caller,
+struct JobStream {
+    access: Access,
     /// Last known state of every job that may still change or was found by the last query.
     seen: BTreeMap<JobId, JobView>,
     /// Events to send.
@@ -166,20 +153,20 @@ struct Feed {
     /// Time given as Last-Event-ID, ms since 1970.
     last_ms: Option<i64>,
     /// Time of the last query, ms since 1970.
-    looked_ms: Option<i64>,
+    queried_ms: Option<i64>,
 }
 
-impl Feed {
+impl JobStream {
     /// Returns the next event, or `None` when the stream ends.
     async fn next(&mut self) -> Option<Event> {
         loop {
             if let Some(event) = self.ready.pop_front() {
                 return Some(event);
             }
-            if self.looked_ms.is_some() && !wait(&self.state, &self.caller).await {
+            if self.queried_ms.is_some() && !wait(&self.access).await {
                 return None;
             }
-            if let Err(error) = self.look().await {
+            if let Err(error) = self.query().await {
                 // The client reconnects with the last id that it received.
                 tracing::warn!(%error, "an event stream could not read its jobs");
                 return None;
@@ -188,18 +175,18 @@ impl Feed {
     }
 
     /// Queries the jobs and collects an event for every change.
-    async fn look(&mut self) -> Result<(), store::Error> {
+    async fn query(&mut self) -> Result<(), store::Error> {
         let now_ms = now_ms();
         let rows = self.rows(now_ms).await?;
         // A new client gets no events of jobs that have ended already.
-        let is_first = self.looked_ms.is_none() && self.last_ms.is_none();
+        let is_first = self.queried_ms.is_none() && self.last_ms.is_none();
         let mut seen = BTreeMap::new();
-        for job in rows.into_iter().map(JobView::of) {
-            let is_news = self.seen.remove(&job.id).as_ref() != Some(&job);
-            if is_news && !(is_first && is_final(&job)) {
+        for job in rows.into_iter().map(JobView::from) {
+            let has_changed = self.seen.remove(&job.id).as_ref() != Some(&job);
+            if has_changed && !(is_first && is_final(&job)) {
                 let event = Event::default().event("job").json_data(&job);
                 self.ready
-                    .extend(event.ok().map(|event| stamped(event, now_ms)));
+                    .extend(event.ok().map(|event| with_id(event, now_ms)));
             }
             seen.insert(job.id, job);
         }
@@ -208,27 +195,27 @@ impl Feed {
             if !is_final(&last) {
                 let event = Event::default().event("gone").json_data(json!({"id": id}));
                 self.ready
-                    .extend(event.ok().map(|event| stamped(event, now_ms)));
+                    .extend(event.ok().map(|event| with_id(event, now_ms)));
             }
         }
-        (self.seen, self.looked_ms) = (seen, Some(now_ms));
+        (self.seen, self.queried_ms) = (seen, Some(now_ms));
         Ok(())
     }
 
     /// Returns the jobs that may have changed since the last query. It includes all that were unfinished
     /// then, unless they were deleted.
     async fn rows(&self, now_ms: i64) -> Result<Vec<JobRow>, store::Error> {
-        let (store, reach) = (&self.state.context.store, &self.caller.reach);
-        let since_ms = self.looked_ms.or(self.last_ms).unwrap_or(now_ms) - OVERLAP_MS;
-        let mut rows = store.jobs_under_way(since_ms, reach).await?;
-        if self.looked_ms.is_none() && self.last_ms.is_some() {
-            rows.extend(store.jobs_ended(since_ms, reach).await?);
+        let (store, owners) = (self.access.store(), &self.access.caller.owners);
+        let since_ms = self.queried_ms.or(self.last_ms).unwrap_or(now_ms) - OVERLAP_MS;
+        let mut rows = store.jobs_under_way(since_ms, owners).await?;
+        if self.queried_ms.is_none() && self.last_ms.is_some() {
+            rows.extend(store.jobs_ended(since_ms, owners).await?);
             rows.sort_by_key(|row| row.id);
             rows.dedup_by_key(|row| row.id);
         }
         for (id, last) in &self.seen {
             if !is_final(last) && !rows.iter().any(|row| row.id == *id) {
-                rows.extend(store.job(*id, reach).await?);
+                rows.extend(store.job(*id, owners).await?);
             }
         }
         Ok(rows)
@@ -236,11 +223,11 @@ impl Feed {
 }
 
 /// Limits the time in a Last-Event-ID, which may be any number, to the last hour.
-fn within_look_back(id_ms: i64, now_ms: i64) -> i64 {
-    id_ms.clamp(now_ms - LOOK_BACK_MS, now_ms)
+fn resume_time(id_ms: i64, now_ms: i64) -> i64 {
+    id_ms.clamp(now_ms - MAX_RESUME_MS, now_ms)
 }
 
-fn stamped(event: Event, now_ms: i64) -> Event {
+fn with_id(event: Event, now_ms: i64) -> Event {
     event.id(now_ms.to_string())
 }
 
@@ -249,15 +236,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stream_looks_back_an_hour_and_never_ahead_whatever_its_id_says() {
+    fn resume_time_lies_within_the_last_hour() {
         let now_ms = 1_800_000_000_000;
         for (id_ms, from_ms) in [
-            (i64::MIN, now_ms - LOOK_BACK_MS),
-            (0, now_ms - LOOK_BACK_MS),
+            (i64::MIN, now_ms - MAX_RESUME_MS),
+            (0, now_ms - MAX_RESUME_MS),
             (now_ms - 5, now_ms - 5),
             (i64::MAX, now_ms),
         ] {
-            assert_eq!(within_look_back(id_ms, now_ms), from_ms, "{id_ms}");
+            assert_eq!(resume_time(id_ms, now_ms), from_ms, "{id_ms}");
         }
     }
 }

@@ -5,7 +5,6 @@ pub(super) mod events; // server-sent events
 pub(super) mod wait; // Prefer: wait=N
 
 use axum::body::Body;
-use axum::extract::State;
 use axum::http::{HeaderMap, Response, StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
@@ -13,20 +12,19 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use self::wait::Wait;
-use super::AppState;
-use super::access::Caller;
-use super::extract::Id;
+use super::extract::{Access, Id};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody};
+use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::timestamp::rfc3339;
 
 use crate::code::Code;
 use crate::ids::{JobId, LibraryId};
 use crate::jobs::clock::now_ms;
-use crate::jobs::refusal::NAME;
+use crate::jobs::refusal::FILE_NAME;
 use crate::store::jobs::cancel::Cancel;
 use crate::store::jobs::read::JobRow;
 use crate::store::jobs::{JobState, Kind};
+use crate::store::resources::Library;
 
 /// A unit of queued work.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
@@ -101,16 +99,13 @@ pub(super) struct JobLinks {
     (status = 200, body = Page<JobView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn list_jobs(
-    State(state): State<AppState>,
-    caller: Caller,
-    paging: Paging,
-) -> Result<axum::Json<Page<JobView>>, Problem> {
-    let store = &state.context.store;
-    let rows = store
-        .list_jobs(paging.limit + 1, paging.cursor, &caller.reach)
-        .await?;
-    Page::of(rows, paging, |row| row.id.0, |row| Ok(JobView::of(row)))
+pub(super) async fn list_jobs(access: Access, paging: Paging) -> JsonAnswer<Page<JobView>> {
+    let (limit, owners) = (paging.n_rows(), &access.caller.owners);
+    let rows = access.store().list_jobs(limit, paging.cursor, owners);
+    let views = rows.await?.into_iter().map(JobView::from).collect();
+    Ok(axum::Json(Page::new(views, paging, |view: &JobView| {
+        view.id.0
+    })))
 }
 
 /// Get one job.
@@ -120,20 +115,15 @@ pub(super) async fn list_jobs(
     (status = 200, body = JobView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn get_job(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-    headers: HeaderMap,
-) -> Result<Response<Body>, Problem> {
-    let job = find(&state, &caller, JobId(id)).await?;
-    let Some(wait) = Wait::of(&headers) else {
+pub(super) async fn get_job(access: Access, Id(id): Id, headers: HeaderMap) -> Answer {
+    let job = find(&access, JobId(id)).await?;
+    let Some(wait) = Wait::from_headers(&headers) else {
         return Ok(axum::Json(job).into_response());
     };
-    let job = wait.for_end(&state, job.id).await?;
-    let job = job.map(JobView::of).ok_or_else(Problem::not_found)?;
+    let job = wait.until_ended(&access.state, job.id).await?;
+    let job = job.map(JobView::from).ok_or_else(Problem::not_found)?;
     let mut answer = axum::Json(job).into_response();
-    wait.applied(answer.headers_mut());
+    wait.mark_applied(answer.headers_mut());
     Ok(answer)
 }
 
@@ -146,12 +136,11 @@ pub(super) async fn get_job(
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_refused_jpeg(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     Id(id): Id,
 ) -> Result<impl IntoResponse, Problem> {
-    let store = &state.context.store;
-    let jpeg = store.refused_jpeg(JobId(id), &caller.reach).await?;
+    let store = access.store();
+    let jpeg = store.refused_jpeg(JobId(id), &access.caller.owners).await?;
     let jpeg = jpeg.ok_or_else(Problem::not_found)?;
     let headers = [
         (header::CONTENT_TYPE, "image/jpeg"),
@@ -172,29 +161,21 @@ pub(super) async fn get_refused_jpeg(
     (status = 202, body = JobView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn cancel_job(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<Response<Body>, Problem> {
-    let status = match state
-        .context
-        .store
-        .cancel(JobId(id), &caller.reach, now_ms())
-        .await?
-    {
+pub(super) async fn cancel_job(access: Access, Id(id): Id) -> Answer {
+    let owners = &access.caller.owners;
+    let status = match access.store().cancel(JobId(id), owners, now_ms()).await? {
         Cancel::Cancelled => StatusCode::OK,
         Cancel::Requested => StatusCode::ACCEPTED,
         Cancel::Final(_) => return Err(Code::AlreadyFinished.into()),
         Cancel::Absent => return Err(Problem::not_found()),
     };
-    let job = find(&state, &caller, JobId(id)).await?;
+    let job = find(&access, JobId(id)).await?;
     Ok((status, axum::Json(job)).into_response())
 }
 
-async fn find(state: &AppState, caller: &Caller, id: JobId) -> Result<JobView, Problem> {
-    let job = state.context.store.job(id, &caller.reach).await?;
-    job.map(JobView::of).ok_or_else(Problem::not_found)
+async fn find(access: &Access, id: JobId) -> Result<JobView, Problem> {
+    let job = access.store().job(id, &access.caller.owners).await?;
+    job.map(JobView::from).ok_or_else(Problem::not_found)
 }
 
 /// Returns 202 with the address of the job in `Location` and that of its future result in `Link`.
@@ -209,12 +190,8 @@ pub(super) fn accepted(job: JobId, result: &str, body: impl Serialize) -> Respon
 
 /// Returns the problem for an absent result: `not_ready` with the state of its job, or `not_found` if no job
 /// makes it.
-pub(super) async fn absent_result(
-    state: &AppState,
-    caller: &Caller,
-    result: Uuid,
-) -> Result<Problem, Problem> {
-    let job = state.context.store.job_of_result(result, &caller.reach);
+pub(super) async fn absent_result(access: &Access, result: Uuid) -> Result<Problem, Problem> {
+    let job = access.store().job_of_result(result, &access.caller.owners);
     let Some(job) = job.await? else {
         return Ok(Problem::not_found());
     };
@@ -229,16 +206,24 @@ pub(super) async fn absent_result(
 /// Returns the analysis that must finish before a library can be used, or `None` if the library exists. Fails
 /// with `invalid_params` if there is no such library and no unfinished analysis makes it.
 pub(super) async fn job_to_follow(
-    state: &AppState,
-    caller: &Caller,
+    access: &Access,
     library_id: LibraryId,
 ) -> Result<Option<JobId>, Problem> {
-    let store = &state.context.store;
-    if store.library(library_id.0, &caller.reach).await?.is_some() {
+    let store = access.store();
+    let library = store.resource::<Library>(library_id.0, &access.caller.owners);
+    if library.await?.is_some() {
         return Ok(None);
     }
-    match store.job_of_result(library_id.0, &caller.reach).await? {
-        Some(job) if job.kind == Kind::Analysis && !is_lost(job.state) => Ok(Some(job.id)),
+    match store
+        .job_of_result(library_id.0, &access.caller.owners)
+        .await?
+    {
+        Some(job)
+            if job.kind == Kind::Analysis
+                && !matches!(job.state, JobState::Failed | JobState::Cancelled) =>
+        {
+            Ok(Some(job.id))
+        }
         _ => {
             let sentence = format!("the library does not exist: {library_id}");
             Err(Problem::new(Code::InvalidParams, sentence))
@@ -247,63 +232,51 @@ pub(super) async fn job_to_follow(
 }
 
 /// Returns the address of a job's result, which may not exist yet.
-pub(super) fn result_of(row: &JobRow) -> String {
-    let noun = match row.kind {
-        Kind::Sample => "footage",
-        Kind::Analysis => "libraries",
-        Kind::Flock => "flocks",
-        Kind::Fish => "fish",
-    };
-    format!("/v1/{noun}/{}", row.result_id)
+pub(super) fn result_path(row: &JobRow) -> String {
+    format!("/v1/{}/{}", row.kind.result_kind().plural(), row.result_id)
 }
 
 /// Returns the footage or library that a job works on.
-fn subject_of(row: &JobRow) -> Option<JobSubject> {
+fn subject(row: &JobRow) -> Option<JobSubject> {
     let kind = match row.kind {
         Kind::Sample => return None,
         Kind::Analysis => "footage",
         Kind::Flock | Kind::Fish => "library",
     };
-    row.subject_id.map(|id| JobSubject { kind, id })
-}
-
-fn is_lost(state: JobState) -> bool {
-    matches!(state, JobState::Failed | JobState::Cancelled)
+    row.subject_id().map(|id| JobSubject { kind, id })
 }
 
 fn is_final(job: &JobView) -> bool {
     job.finished_at.is_some()
 }
 
-impl JobView {
-    fn of(row: JobRow) -> JobView {
-        let (result, subject) = (result_of(&row), subject_of(&row));
+impl From<JobRow> for JobView {
+    fn from(row: JobRow) -> JobView {
+        let path = format!("/v1/jobs/{}", row.id);
         JobView {
             id: row.id,
             kind: row.kind.name(),
             state: row.state.name(),
-            stage: row.stage,
             progress: row.progress,
             attempt: row.attempt,
             cancel_requested: row.cancel_requested,
-            error: row.failure.map(|(code, detail)| JobFailure {
-                picture: row
-                    .has_picture
-                    .then(|| format!("/v1/jobs/{}/{NAME}", row.id)),
-                code: code.name(),
-                title: code.meaning(),
-                detail,
-                advice: code.advice(),
+            error: row.failure().map(|failure| JobFailure {
+                picture: row.has_picture.then(|| format!("{path}/{FILE_NAME}")),
+                code: failure.code.name(),
+                title: failure.code.meaning(),
+                detail: failure.detail,
+                advice: failure.code.advice(),
             }),
             created_at: rfc3339(row.created_ms),
             started_at: row.started_ms.map(rfc3339),
             finished_at: row.finished_ms.map(rfc3339),
-            subject,
+            subject: subject(&row),
             links: JobLinks {
-                this: format!("/v1/jobs/{}", row.id),
-                events: format!("/v1/jobs/{}/events", row.id),
-                result,
+                events: format!("{path}/events"),
+                this: path,
+                result: result_path(&row),
             },
+            stage: row.stage,
         }
     }
 }

@@ -15,13 +15,13 @@ use crate::api::AppState;
 use crate::ids::JobId;
 use crate::store::jobs::JobState;
 use crate::store::jobs::read::JobRow;
-use crate::store::owners::Reach;
+use crate::store::owners::OwnerFilter;
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 /// Longest wait, seconds. Free choice.
 const MAX_WAIT_S: u64 = 60;
 /// Interval between two queries of the job. Free choice.
-const LOOK: Duration = Duration::from_millis(200);
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Time that the client is willing to wait, seconds, at most [`MAX_WAIT_S`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub(super) struct Wait(u64);
 
 impl Wait {
     /// Returns the wait that the headers ask for. A malformed preference is ignored.
-    pub(super) fn of(headers: &HeaderMap) -> Option<Wait> {
+    pub(super) fn from_headers(headers: &HeaderMap) -> Option<Wait> {
         let lines = headers.get_all(PREFER);
         let lines = lines.iter().filter_map(|line| line.to_str().ok());
         lines
@@ -43,7 +43,7 @@ impl Wait {
     }
 
     /// Adds `Preference-Applied` to the headers of the response.
-    pub(super) fn applied(self, headers: &mut HeaderMap) {
+    pub(super) fn mark_applied(self, headers: &mut HeaderMap) {
         if let Ok(value) = HeaderValue::from_str(&format!("wait={}", self.0)) {
             headers.insert(HeaderName::from_static("preference-applied"), value);
         }
@@ -51,20 +51,20 @@ impl Wait {
 
     /// Waits until the job has ended or the time is up, and returns its state. Returns `None` if there is no
     /// such job.
-    pub(super) async fn for_end(
+    pub(super) async fn until_ended(
         self,
         state: &AppState,
         id: JobId,
     ) -> Result<Option<JobRow>, crate::store::Error> {
         let end = Instant::now() + Duration::from_secs(self.0);
         loop {
-            let job = state.context.store.job(id, &Reach::All).await?;
+            let job = state.context.store.job(id, &OwnerFilter::All).await?;
             let is_running = job.as_ref().is_some_and(|job| !job.state.is_final());
             if !is_running || Instant::now() >= end || state.context.draining.is_cancelled() {
                 return Ok(job);
             }
             tokio::select! {
-                () = sleep(LOOK) => {}
+                () = sleep(POLL_INTERVAL) => {}
                 () = state.context.draining.cancelled() => {}
             }
         }
@@ -78,7 +78,7 @@ pub(in crate::api) async fn wait_for_result(
     request: Request,
     next: Next,
 ) -> Response {
-    let wait = Wait::of(request.headers()).filter(|_| request.method() == Method::POST);
+    let wait = Wait::from_headers(request.headers()).filter(|_| request.method() == Method::POST);
     let mut answer = next.run(request).await;
     let location = answer.headers().get(header::LOCATION);
     let job_id = location.and_then(|value| value.to_str().ok()?.strip_prefix("/v1/jobs/"));
@@ -86,10 +86,10 @@ pub(in crate::api) async fn wait_for_result(
     let (Some(wait), Some(job_id), StatusCode::ACCEPTED) = (wait, job_id, answer.status()) else {
         return answer;
     };
-    wait.applied(answer.headers_mut());
-    match wait.for_end(&state, job_id).await {
+    wait.mark_applied(answer.headers_mut());
+    match wait.until_ended(&state, job_id).await {
         Ok(Some(job)) if job.state == JobState::Done => {
-            let result = HeaderValue::from_str(&super::result_of(&job));
+            let result = HeaderValue::from_str(&super::result_path(&job));
             if let Ok(result) = result {
                 answer.headers_mut().insert(header::LOCATION, result);
                 answer.headers_mut().remove(header::RETRY_AFTER);
@@ -107,9 +107,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wait_is_found_among_other_preferences_and_bounded() {
+    fn wait_is_parsed_among_other_preferences_and_limited() {
         let of = |text| {
-            Wait::of(&HeaderMap::from_iter([(
+            Wait::from_headers(&HeaderMap::from_iter([(
                 PREFER,
                 HeaderValue::from_static(text),
             )]))

@@ -122,12 +122,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_becomes_html_and_program_text_is_marked() {
+    fn text_is_escaped_and_code_is_marked() {
         assert_eq!(marked("a < b & `c`."), "a &lt; b &amp; <code>c</code>.");
     }
 
     #[test]
-    fn the_files_of_the_description_are_inside_the_program() {
+    fn every_status_has_a_reason() {
+        for &code in Code::ALL {
+            assert!(!entry(code).contains("unknown status"), "{code}");
+        }
+        assert!(entry(Code::ChecksumMismatch).contains("460 Checksum Mismatch"));
+    }
+
+    #[test]
+    fn swagger_files_are_embedded() {
         let sizes: Vec<_> = LOADED.iter().map(|file| file.bytes.len()).collect();
         assert!(
             sizes.len() == 2 && sizes.iter().all(|&n_bytes| n_bytes > 50_000),

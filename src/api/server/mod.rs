@@ -4,7 +4,7 @@
 //! one. If all connections are in use, a few more are accepted for one response each: `busy`, or that of
 //! /healthz.
 
-mod patience;
+mod slow_clients;
 
 use std::io;
 use std::sync::Arc;
@@ -25,8 +25,8 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tower::ServiceExt;
 
-pub(super) use patience::is_too_slow;
-use patience::{Paced, Patient};
+pub(super) use slow_clients::is_too_slow;
+use slow_clients::{MinRateBody, WriteTimeout};
 
 use super::Problem;
 use super::access::Peer;
@@ -35,16 +35,16 @@ use crate::code::Code;
 /// Largest number of connections that are served normally. Free choice.
 const MAX_CONNECTIONS: usize = 2048;
 /// Largest number of further connections, which get one response each. Free choice.
-const MAX_CROWD: usize = 64;
+const MAX_OVERFLOW_CONNECTIONS: usize = 64;
 /// Longest wait for the head of a request, and for the next request on an idle connection. Free choice.
-const HEAD: Duration = Duration::from_secs(30);
+const HEAD_TIMEOUT: Duration = Duration::from_secs(30);
 /// Size of the read buffer for the head of a request, bytes. Free choice.
 const MAX_HEAD_BYTES: usize = 64 << 10;
 /// Longest wait for running requests when the service stops. Free choice.
-const DRAIN: Duration = Duration::from_secs(10);
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Longest wait for the responses to connections that arrived during the stop. Free choice.
-const FAREWELL: Duration = Duration::from_secs(1);
+const LAST_RESPONSES_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// The two steps of a stop.
 #[derive(Clone, Debug, Default)]
@@ -58,17 +58,17 @@ pub struct Stop {
 
 /// Serves connections until the stop begins, and then as described at [`Stop`].
 pub async fn serve(listener: TcpListener, router: Router, stop: Stop) {
-    let (under_way, newcomers) = (TaskTracker::new(), TaskTracker::new());
-    let door = Door::new(listener, router, [MAX_CONNECTIONS, MAX_CROWD]);
-    let usual = builder();
+    let (connections, late_connections) = (TaskTracker::new(), TaskTracker::new());
+    let acceptor = Acceptor::new(listener, router, MAX_CONNECTIONS, MAX_OVERFLOW_CONNECTIONS);
+    let keep_alive = keep_alive_builder();
     tokio::select! {
-        () = door.let_in(&usual, &under_way, &stop.begun) => {}
+        () = acceptor.accept_all(&keep_alive, &connections, &stop.begun) => {}
         () = stop.begun.cancelled() => {}
     }
-    under_way.close();
+    connections.close();
     let ended = async {
-        if timeout(DRAIN, under_way.wait()).await.is_err() {
-            let n_connections = under_way.len();
+        if timeout(DRAIN_TIMEOUT, connections.wait()).await.is_err() {
+            let n_connections = connections.len();
             tracing::warn!(
                 n_connections,
                 "open requests were cut off at the end of the grace period"
@@ -76,39 +76,46 @@ pub async fn serve(listener: TcpListener, router: Router, stop: Stop) {
         }
         stop.over.cancelled().await;
     };
-    let (once, never) = (once(), CancellationToken::new());
+    let (one_request, never) = (one_request_builder(), CancellationToken::new());
     tokio::select! {
-        () = door.let_in(&once, &newcomers, &never) => {}
+        () = acceptor.accept_all(&one_request, &late_connections, &never) => {}
         () = ended => {}
     }
-    drop(door);
-    newcomers.close();
-    timeout(FAREWELL, newcomers.wait()).await.ok();
+    drop(acceptor);
+    late_connections.close();
+    timeout(LAST_RESPONSES_TIMEOUT, late_connections.wait())
+        .await
+        .ok();
 }
 
 /// The listener and its limits.
-struct Door {
+struct Acceptor {
     listener: TcpListener,
     router: Router,
     /// Router for connections beyond the limit.
-    in_crowd: Router,
-    room: Arc<Semaphore>,
-    crowd: Arc<Semaphore>,
+    overflow_router: Router,
+    permits: Arc<Semaphore>,
+    overflow_permits: Arc<Semaphore>,
 }
 
-impl Door {
-    fn new(listener: TcpListener, router: Router, [room, crowd]: [usize; 2]) -> Door {
-        Door {
+impl Acceptor {
+    fn new(
+        listener: TcpListener,
+        router: Router,
+        n_permits: usize,
+        n_overflow_permits: usize,
+    ) -> Acceptor {
+        Acceptor {
             listener,
-            in_crowd: router.clone().layer(from_fn(answer_in_crowd)),
+            overflow_router: router.clone().layer(from_fn(answer_overflow)),
             router,
-            room: Arc::new(Semaphore::new(room)),
-            crowd: Arc::new(Semaphore::new(crowd)),
+            permits: Arc::new(Semaphore::new(n_permits)),
+            overflow_permits: Arc::new(Semaphore::new(n_overflow_permits)),
         }
     }
 
     /// Accepts connections forever and serves each in its own task.
-    async fn let_in(
+    async fn accept_all(
         &self,
         builder: &Builder<TokioExecutor>,
         connections: &TaskTracker,
@@ -116,15 +123,16 @@ impl Door {
     ) {
         loop {
             match self.accept().await {
-                Ok((stream, permit, is_crowd)) => {
-                    let (builder, router) = match is_crowd {
-                        false => (builder.clone(), self.router.clone()),
-                        true => (once(), self.in_crowd.clone()),
+                Ok(connection) => {
+                    let (builder, router) = if connection.is_overflow {
+                        (one_request_builder(), self.overflow_router.clone())
+                    } else {
+                        (builder.clone(), self.router.clone())
                     };
                     let stop = stop.clone();
                     connections.spawn(async move {
-                        answer(&builder, stream, router, stop).await;
-                        drop(permit);
+                        answer(&builder, connection.stream, router, stop).await;
+                        drop(connection.permit);
                     });
                 }
                 Err(error) => {
@@ -136,28 +144,39 @@ impl Door {
         }
     }
 
-    /// Returns the next connection, its permit, and whether it is beyond the limit.
-    async fn accept(&self) -> io::Result<(TcpStream, OwnedSemaphorePermit, bool)> {
-        let usual = || self.room.clone().try_acquire_owned().ok();
-        let (mut permit, mut is_crowd) = match usual() {
+    async fn accept(&self) -> io::Result<Connection> {
+        let usual_permit = || self.permits.clone().try_acquire_owned().ok();
+        let (mut permit, mut is_overflow) = match usual_permit() {
             Some(permit) => (permit, false),
             None => {
-                let permit = self.crowd.clone().acquire_owned().await;
+                let permit = self.overflow_permits.clone().acquire_owned().await;
                 (permit.map_err(io::Error::other)?, true)
             }
         };
         let (stream, _) = self.listener.accept().await?;
         stream.set_nodelay(true)?;
         // Another connection may have closed during the wait.
-        if let Some(place) = usual().filter(|_| is_crowd) {
-            (permit, is_crowd) = (place, false);
+        if is_overflow && let Some(usual) = usual_permit() {
+            (permit, is_overflow) = (usual, false);
         }
-        Ok((stream, permit, is_crowd))
+        Ok(Connection {
+            stream,
+            permit,
+            is_overflow,
+        })
     }
 }
 
+/// An accepted connection.
+struct Connection {
+    stream: TcpStream,
+    permit: OwnedSemaphorePermit,
+    /// Whether the connection is beyond the limit.
+    is_overflow: bool,
+}
+
 /// Middleware of connections beyond the limit: refuses requests with `busy`, except /healthz.
-async fn answer_in_crowd(request: Request, next: Next) -> Response {
+async fn answer_overflow(request: Request, next: Next) -> Response {
     match request.uri().path() {
         "/healthz" => next.run(request).await,
         _ => Problem::from(Code::Busy).into_response(),
@@ -176,10 +195,10 @@ async fn answer(
         if let Some(peer) = peer {
             request.extensions_mut().insert(peer);
         }
-        request.map(Paced::new)
+        request.map(MinRateBody::new)
     });
     let service = TowerToHyperService::new(router);
-    let connection = builder.serve_connection(TokioIo::new(Patient::new(stream)), service);
+    let connection = builder.serve_connection(TokioIo::new(WriteTimeout::new(stream)), service);
     let mut connection = std::pin::pin!(connection);
     let ended = tokio::select! {
         ended = connection.as_mut() => ended,
@@ -194,20 +213,20 @@ async fn answer(
 }
 
 /// Returns a builder without keep-alive: one request per connection.
-fn once() -> Builder<TokioExecutor> {
-    let mut once = builder();
-    once.http1().keep_alive(false);
-    once
+fn one_request_builder() -> Builder<TokioExecutor> {
+    let mut builder = keep_alive_builder();
+    builder.http1().keep_alive(false);
+    builder
 }
 
 /// Returns a builder with the limits of this module. It supports only HTTP/1: detecting HTTP/2 would wait for
 /// the first bytes without a timeout. Browsers use HTTP/2 only over TLS, which a proxy provides.
-fn builder() -> Builder<TokioExecutor> {
+fn keep_alive_builder() -> Builder<TokioExecutor> {
     let mut builder = Builder::new(TokioExecutor::new()).http1_only();
     builder
         .http1()
         .timer(TokioTimer::new())
-        .header_read_timeout(HEAD)
+        .header_read_timeout(HEAD_TIMEOUT)
         .max_buf_size(MAX_HEAD_BYTES);
     builder
 }
@@ -233,16 +252,18 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn when_all_connections_are_taken_others_are_told_so_and_may_ask_for_life() {
+    async fn connections_beyond_the_limit_get_503_except_for_healthz() {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
         let router = Router::new()
             .route("/healthz", get(|| async { "well" }))
             .route("/", get(|| async { "the page" }));
-        let door = Door::new(listener, router, [1, 2]);
+        let acceptor = Acceptor::new(listener, router, 1, 2);
         let (connections, never) = (TaskTracker::new(), CancellationToken::new());
-        let door = tokio::spawn(async move {
-            door.let_in(&builder(), &connections, &never).await;
+        let accepting = tokio::spawn(async move {
+            acceptor
+                .accept_all(&keep_alive_builder(), &connections, &never)
+                .await;
         });
         let (taken, first) = ask(address, "/").await;
         assert_eq!(first, "HTTP/1.1 200 OK");
@@ -256,6 +277,6 @@ mod tests {
         sleep(Duration::from_millis(50)).await;
         let (_open, next) = ask(address, "/").await;
         assert_eq!(next, "HTTP/1.1 200 OK");
-        door.abort();
+        accepting.abort();
     }
 }

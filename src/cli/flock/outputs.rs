@@ -9,7 +9,8 @@ use crate::cli::sample::parse_size;
 use crate::cli::{Error, extension, set};
 use crate::flock::Params;
 use crate::flock::composite::params::{Background, Format, Render};
-use crate::jobs::flock::film::{Backdrop, Output, Target};
+use crate::jobs::flock::film::Backdrop;
+use crate::jobs::flock::target::{Output, Target};
 use crate::media::{Limits, Video, read_image};
 use crate::raster::RgbImage;
 
@@ -140,7 +141,7 @@ impl OpenBackground {
     /// Returns the background in the type that `Film` takes.
     pub(super) fn backdrop(&self) -> Backdrop<'_> {
         match self {
-            OpenBackground::FromParams => Backdrop::AsAsked,
+            OpenBackground::FromParams => Backdrop::FromParams,
             OpenBackground::Picture(picture) => Backdrop::Picture(picture),
             OpenBackground::Video(video) => Backdrop::Film(video.as_ref()),
         }

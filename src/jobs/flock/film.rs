@@ -5,10 +5,11 @@
 //! The frames are drawn in at most two passes: as planes for encoders without transparency, and as RGBA for
 //! the others.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::behind::Behind;
+use super::background_video::BackgroundVideo;
 use super::sink::{self, Sink};
+use super::target::{Output, Target};
 use super::truth::TruthFolder;
 use crate::flock::composite::params::{Background, Format};
 use crate::flock::{Compositor, Flock, Shot};
@@ -36,40 +37,23 @@ pub struct Film<'a> {
 #[derive(Clone, Copy)]
 pub enum Backdrop<'a> {
     /// The background selected by the flock's parameters.
-    AsAsked,
+    FromParams,
     /// A picture.
     Picture(&'a RgbImage),
     /// A video, repeated as needed.
     Film(&'a dyn FrameSource),
 }
 
-/// A file to write.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Target {
-    /// Content of the file.
-    pub output: Output,
-    /// Path of the file. PNG frames go to a folder, or to an archive if the path ends in `.zip`. A poster is
-    /// a JPEG if the path ends in `.jpg` or `.jpeg`, otherwise a PNG.
-    pub path: PathBuf,
-}
-
-/// Content of an output file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Output {
-    /// The flock, in this format.
-    Film(Format),
-    /// The flock with position and heading of every boid drawn over it, as MP4.
-    Overlay,
-}
-
-impl Output {
-    /// Returns whether the file is encoded from planes, without transparency.
-    fn is_planar(self) -> bool {
-        match self {
-            Output::Film(format) => !format.has_alpha(),
-            Output::Overlay => true,
-        }
-    }
+/// One pass over the frames.
+struct Pass<'a> {
+    /// Files to write.
+    targets: &'a [&'a Target],
+    /// Folder of the ground truth, if this pass writes it.
+    truth: Option<&'a Path>,
+    /// Number of passes before this one.
+    n_before: usize,
+    /// Number of all passes.
+    n_passes: usize,
 }
 
 impl Film<'_> {
@@ -81,37 +65,40 @@ impl Film<'_> {
         let (planar, straight): (Vec<&Target>, Vec<&Target>) = moving
             .into_iter()
             .partition(|target| target.output.is_planar());
-        // Foreground objects are drawn only in opaque videos, so the ground truth of the two passes differs.
-        // It is computed with the opaque pass, if there is one.
         let has_planar = !planar.is_empty() || (straight.is_empty() && truth.is_some());
-        let of_straight = truth.filter(|_| !has_planar);
         let n_passes = usize::from(has_planar) + usize::from(!straight.is_empty());
         let compositor = Compositor::new(self.library, self.flock);
         if has_planar {
-            self.pass(compositor, (&planar, truth), (0, n_passes))?;
+            let pass = Pass {
+                targets: &planar,
+                truth,
+                n_before: 0,
+                n_passes,
+            };
+            self.run_pass(compositor, &pass)?;
         }
         if !straight.is_empty() {
             let compositor = Compositor::new(self.library, self.flock).straight();
-            self.pass(
-                compositor,
-                (&straight, of_straight),
-                (n_passes - 1, n_passes),
-            )?;
+            let pass = Pass {
+                targets: &straight,
+                // Foreground objects are drawn only in opaque videos, so the ground truth of the two passes
+                // differs. It is computed with the opaque pass, if there is one.
+                truth: truth.filter(|_| !has_planar),
+                n_before: n_passes - 1,
+                n_passes,
+            };
+            self.run_pass(compositor, &pass)?;
         }
         posters
             .into_iter()
             .try_for_each(|target| self.poster(target))
     }
 
-    fn pass(
-        &self,
-        compositor: Compositor,
-        (targets, truth): (&[&Target], Option<&Path>),
-        (pass, n_passes): (usize, usize),
-    ) -> Result<(), Error> {
-        let compositor = match truth {
-            Some(_) => self.before(compositor).with_truth(),
-            None => self.before(compositor),
+    fn run_pass(&self, compositor: Compositor, pass: &Pass) -> Result<(), Error> {
+        let targets = pass.targets;
+        let compositor = match pass.truth {
+            Some(_) => self.with_backdrop(compositor).with_truth(),
+            None => self.with_backdrop(compositor),
         };
         let shape = FilmShape {
             size_px: compositor.size_px(),
@@ -121,8 +108,9 @@ impl Film<'_> {
         // Encoders start with the first frame. More frames are drawn while they start.
         let mut sinks = Vec::new();
         let begin = |target: &&Target| Sink::begin(target, shape, self.flock, self.is_clear());
-        let mut truth = (truth.map(|folder| TruthFolder::create(folder, shape))).transpose()?;
-        let mut behind = self.behind()?;
+        let truth = pass.truth.map(|folder| TruthFolder::create(folder, shape));
+        let mut truth = truth.transpose()?;
+        let mut background = self.background_video()?;
         let n_wanted = targets.iter().map(|target| sink::n_wanted(target, shape));
         let n_frames = match truth {
             Some(_) => shape.n_frames,
@@ -130,8 +118,8 @@ impl Film<'_> {
         };
         compositor.first(n_frames).render_all(
             |frame_idx, shot| {
-                let next = behind.as_mut().map(|behind| behind.at(frame_idx, shot));
-                next.unwrap_or(Ok(()))
+                let drawn = background.as_mut().map(|video| video.draw(frame_idx, shot));
+                drawn.unwrap_or(Ok(()))
             },
             |frame_idx, shot: &Shot| {
                 if self.progress.cancelled() {
@@ -149,8 +137,9 @@ impl Film<'_> {
                 if let Some(truth) = &mut truth {
                     truth.add(self.flock, frame_idx, &shot.truth)?;
                 }
-                let done = pass as f64 + (frame_idx + 1) as f64 / n_frames as f64;
-                self.progress.report("rendering", done / n_passes as f64);
+                let done = pass.n_before as f64 + (frame_idx + 1) as f64 / n_frames as f64;
+                self.progress
+                    .report("rendering", done / pass.n_passes as f64);
                 Ok(())
             },
         )?;
@@ -160,10 +149,10 @@ impl Film<'_> {
 
     /// Writes the middle frame as a picture.
     fn poster(&self, target: &Target) -> Result<(), Error> {
-        let compositor = self.before(Compositor::new(self.library, self.flock).straight());
+        let compositor = self.with_backdrop(Compositor::new(self.library, self.flock).straight());
         let (mut shot, middle) = (Shot::default(), compositor.n_frames() / 2);
-        if let Some(mut behind) = self.behind()? {
-            behind.at(middle, &mut shot)?;
+        if let Some(mut video) = self.background_video()? {
+            video.draw(middle, &mut shot)?;
         }
         compositor.render(middle, &mut shot);
         Ok(sink::poster(
@@ -174,23 +163,23 @@ impl Film<'_> {
         )?)
     }
 
-    fn before<'a>(&self, compositor: Compositor<'a>) -> Compositor<'a> {
+    fn with_backdrop<'a>(&self, compositor: Compositor<'a>) -> Compositor<'a> {
         match self.backdrop {
             Backdrop::Picture(picture) => compositor.before(picture),
-            Backdrop::AsAsked | Backdrop::Film(_) => compositor,
+            Backdrop::FromParams | Backdrop::Film(_) => compositor,
         }
     }
 
-    fn behind(&self) -> Result<Option<Behind<'_>>, Error> {
+    fn background_video(&self) -> Result<Option<BackgroundVideo<'_>>, Error> {
         match self.backdrop {
-            Backdrop::Film(source) => Ok(Some(Behind::of(source, self.flock.fps)?)),
-            Backdrop::AsAsked | Backdrop::Picture(_) => Ok(None),
+            Backdrop::Film(source) => Ok(Some(BackgroundVideo::open(source, self.flock.fps)?)),
+            Backdrop::FromParams | Backdrop::Picture(_) => Ok(None),
         }
     }
 
     /// Returns whether the background is transparent, in formats that support it.
     fn is_clear(&self) -> bool {
-        matches!(self.backdrop, Backdrop::AsAsked)
+        matches!(self.backdrop, Backdrop::FromParams)
             && self.flock.params.render.background == Background::Transparent
     }
 }

@@ -2,9 +2,10 @@
 //! "Compositing"). It writes `flock.json`, `plan.svg`, `video.mp4`, and the further files that the `render`
 //! parameters request.
 
-mod behind; // video background
+mod background_video;
 pub mod film; // flock -> files
 mod sink; // encoders and pictures
+pub mod target; // files that can be made
 pub mod truth; // ground truth
 
 use std::collections::BTreeSet;
@@ -15,19 +16,17 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use self::film::{Backdrop, Film, Output, Target};
+use self::film::{Backdrop, Film};
+use self::target::{Output, Target};
 use super::analysis::Advice;
-use super::{Attempt, Context, Error, Product, Stages};
+use super::{Attempt, Error, JobInput, Product, Stages};
 use crate::flock::composite::params::{Format, Render};
 use crate::flock::{self, Flock, Params, plan_flock};
-use crate::formats::{flock_json, library_dir, svg};
-use crate::ids::{FlockId, JobId, LibraryId};
+use crate::formats::{flock_json, svg};
+use crate::ids::{FlockId, LibraryId};
 use crate::library::Library;
-use crate::progress::Progress;
-use crate::store;
 use crate::store::jobs::Kind;
-use crate::store::jobs::finish::Made;
-use crate::store::owners::Account;
+use crate::store::jobs::finish::Source;
 
 /// Stages with their share of the running time; measured.
 pub const STAGES: Stages = &[
@@ -65,25 +64,12 @@ pub struct Summary {
     pub advice: Vec<Advice>,
 }
 
-/// Queues a flock. If `after_job` is given, it starts after that job, which makes its library. Returns the id
-/// of the job and the id that the flock will have.
-pub async fn enqueue(
-    context: &Context,
-    input: &Input,
-    after_job: Option<JobId>,
-    account: &Account,
-) -> Result<(JobId, FlockId), store::Error> {
-    let queued = context.enqueue(Kind::Flock, input, after_job, account);
-    let (job_id, flock_id) = queued.await?;
-    Ok((job_id, FlockId(flock_id)))
-}
+impl JobInput for Input {
+    const KIND: Kind = Kind::Flock;
+    type ResultId = FlockId;
 
-impl Input {
-    /// Simulates, plans and renders the flock into the folder of the attempt, and returns the result's row.
-    pub fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
-        let (_, files) = attempt.library(self.library_id)?;
-        attempt.listener.report("loading", 0.0);
-        let library = library_dir::read(files.path(), attempt.scratch())?.library;
+    fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
+        let library = attempt.library(self.library_id)?;
         let flock = plan_flock(&library, &self.params, attempt.listener)?;
         let folder = attempt.folder();
         let mut file = BufWriter::new(File::create(folder.join("flock.json"))?);
@@ -103,7 +89,7 @@ impl Input {
                 .collect(),
         };
         Ok(Product {
-            made: Made::Flock(self.library_id.0),
+            source: Source::Resource(self.library_id.0),
             params: serde_json::to_string(&flock.params)?,
             summary: serde_json::to_string(&summary)?,
         })
@@ -115,7 +101,7 @@ fn render(attempt: &Attempt, library: &Library, flock: &Flock) -> Result<(), Err
     let film = Film {
         library,
         flock,
-        backdrop: Backdrop::AsAsked,
+        backdrop: Backdrop::FromParams,
         progress: attempt.listener,
     };
     let truth = folder.join("ground-truth");

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use zip::write::SimpleFileOptions;
 
-use super::film::{Output, Target};
+use super::target::{Output, Target};
 use crate::flock::composite::params::Format;
 use crate::flock::{Flock, Shot};
 use crate::formats::flock_overlay::FlockOverlay;
@@ -151,9 +151,10 @@ fn pictures(path: &Path) -> io::Result<Kind> {
 }
 
 fn png([width, height]: [u32; 2], alpha: bool, rgba: &[u8]) -> Vec<u8> {
-    match alpha {
-        true => picture::write_rgba(width, height, rgba),
-        false => picture::write_rgb(&without_alpha(width, height, rgba)),
+    if alpha {
+        picture::write_rgba(width, height, rgba)
+    } else {
+        picture::write_rgb(&without_alpha(width, height, rgba))
     }
 }
 
@@ -162,9 +163,10 @@ pub(super) fn poster(path: &Path, size_px: [u32; 2], alpha: bool, rgba: &[u8]) -
     let is_jpeg = path
         .extension()
         .is_some_and(|extension| extension == "jpg" || extension == "jpeg");
-    let bytes = match is_jpeg {
-        true => picture::write_jpeg(&without_alpha(size_px[0], size_px[1], rgba)),
-        false => png(size_px, alpha, rgba),
+    let bytes = if is_jpeg {
+        picture::write_jpeg(&without_alpha(size_px[0], size_px[1], rgba))
+    } else {
+        png(size_px, alpha, rgba)
     };
     fs::write(path, bytes)
 }
@@ -185,7 +187,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_longer_film_left_goes_and_nothing_else() {
+    fn leftover_frames_are_removed_and_other_files_kept() {
         let folder = tempfile::tempdir().expect("a folder");
         let names = (0..5).map(frame_name).chain(["notes.txt".to_owned()]);
         for name in names {

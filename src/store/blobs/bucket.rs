@@ -19,16 +19,17 @@ use tokio::io::{AsyncWriteExt, BufReader};
 use tokio::time::timeout;
 
 use super::Folder;
+use crate::store::resources::ResourceKind;
 use crate::store::{Error, tls};
 
 /// Size of every part except the last, bytes. It exceeds the minimum of every provider, and some require
 /// equal sizes.
 const PART_BYTES: usize = 16 << 20;
 /// Size of one read request, bytes. Short requests do not stay open while a client downloads slowly.
-const PIECE_BYTES: u64 = 4 << 20;
+const READ_BYTES: u64 = 4 << 20;
 
 /// Maximum wait of a readiness probe. If the bucket is slow, the next probe asks again. Free choice.
-const ANSWER: Duration = Duration::from_secs(2);
+const PROBE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// A bucket and the prefix of our files in it.
 #[derive(Clone, Debug)]
@@ -61,7 +62,7 @@ impl Bucket {
         let nothing = self.path("footage/readiness");
         let asked = self.store.head(&nothing);
         matches!(
-            timeout(ANSWER, asked).await,
+            timeout(PROBE_TIMEOUT, asked).await,
             Ok(Ok(_) | Err(object_store::Error::NotFound { .. }))
         )
     }
@@ -97,7 +98,7 @@ impl Bucket {
         try_unfold(first, move |at| {
             let (store, path) = (store.clone(), path.clone());
             async move {
-                let until = end.min(at + PIECE_BYTES);
+                let until = end.min(at + READ_BYTES);
                 if at == until {
                     return Ok(None);
                 }
@@ -151,7 +152,9 @@ impl Bucket {
         let path = object.location.as_ref().strip_prefix(&self.prefix)?;
         let (folder, _name) = path.trim_start_matches('/').rsplit_once('/')?;
         let (kind, _) = folder.split_once('/')?;
-        super::KINDS.contains(&kind).then(|| folder.to_owned())
+        let mut kinds = ResourceKind::ALL.iter();
+        let is_ours = kinds.any(|known| known.plural() == kind);
+        is_ours.then(|| folder.to_owned())
     }
 
     fn path(&self, within: &str) -> Path {

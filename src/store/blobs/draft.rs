@@ -9,12 +9,12 @@ use std::sync::{Mutex, PoisonError};
 
 use sqlx::types::Uuid;
 
-use super::shelf::size_of;
+use super::local::size_of;
 
 /// The folder in which the processes of a machine keep their drafts.
 #[derive(Debug)]
-pub(in crate::store) struct Workplace {
-    tmp: PathBuf,
+pub(in crate::store) struct Drafts {
+    folder: PathBuf,
     /// Folder of this process and its lock; created on first use.
     own: Mutex<Option<(PathBuf, File)>>,
 }
@@ -23,67 +23,71 @@ pub(in crate::store) struct Workplace {
 #[derive(Debug)]
 pub struct Draft {
     path: PathBuf,
-    kept: bool,
+    adopted: bool,
 }
 
-impl Workplace {
-    pub(super) fn open(tmp: &Path) -> io::Result<Workplace> {
-        fs::create_dir_all(tmp)?;
-        Ok(Workplace {
-            tmp: tmp.to_owned(),
+impl Drafts {
+    pub(super) fn open(folder: &Path) -> io::Result<Drafts> {
+        fs::create_dir_all(folder)?;
+        Ok(Drafts {
+            folder: folder.to_owned(),
             own: Mutex::new(None),
         })
     }
 
     /// Returns the folder that all processes share.
     pub(super) fn folder(&self) -> &Path {
-        &self.tmp
+        &self.folder
     }
 
     pub(super) fn draft(&self, name: &str) -> io::Result<Draft> {
         let mut own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
         let (folder, _lock) = match own.take() {
             Some(own) => own,
-            None => make_own(&self.tmp)?,
+            None => create_own_folder(&self.folder)?,
         };
         let path = folder.join(name);
         let made = fs::create_dir(&path);
         *own = Some((folder, _lock));
         made?;
-        Ok(Draft { path, kept: false })
+        Ok(Draft {
+            path,
+            adopted: false,
+        })
     }
 
     /// Removes the folders of processes that have ended. Returns their number.
     pub(in crate::store) fn sweep(&self) -> io::Result<usize> {
-        let left = self.left()?;
-        for (path, _lock) in &left {
-            match path.is_dir() {
-                true => fs::remove_dir_all(path)?,
-                false => fs::remove_file(path)?,
+        let abandoned = self.abandoned()?;
+        for (path, _lock) in &abandoned {
+            if path.is_dir() {
+                fs::remove_dir_all(path)?;
+            } else {
+                fs::remove_file(path)?;
             }
         }
-        Ok(left.len())
+        Ok(abandoned.len())
     }
 
     /// Returns the number of folders of processes that have ended, and their total size in bytes.
-    pub(in crate::store) fn n_left(&self) -> io::Result<(usize, u64)> {
-        let left = self.left()?;
-        let sizes = left.iter().map(|(path, _lock)| size_of(path));
-        Ok((left.len(), sizes.sum::<io::Result<u64>>()?))
+    pub(in crate::store) fn n_abandoned(&self) -> io::Result<(usize, u64)> {
+        let abandoned = self.abandoned()?;
+        let sizes = abandoned.iter().map(|(path, _lock)| size_of(path));
+        Ok((abandoned.len(), sizes.sum::<io::Result<u64>>()?))
     }
 
     /// Returns the folders of processes that have ended, locked by this process.
-    fn left(&self) -> io::Result<Vec<(PathBuf, File)>> {
-        let mut left = Vec::new();
-        for entry in fs::read_dir(&self.tmp)? {
+    fn abandoned(&self) -> io::Result<Vec<(PathBuf, File)>> {
+        let mut abandoned = Vec::new();
+        for entry in fs::read_dir(&self.folder)? {
             let path = entry?.path();
             if let Ok(folder) = File::open(&path)
                 && folder.try_lock().is_ok()
             {
-                left.push((path, folder));
+                abandoned.push((path, folder));
             }
         }
-        Ok(left)
+        Ok(abandoned)
     }
 
     /// Removes this process's folder if it is empty.
@@ -99,7 +103,7 @@ impl Workplace {
 
 /// Creates and locks a folder for this process. Another process may remove the folder before it is locked;
 /// then another one is created.
-fn make_own(tmp: &Path) -> io::Result<(PathBuf, File)> {
+fn create_own_folder(tmp: &Path) -> io::Result<(PathBuf, File)> {
     loop {
         let path = tmp.join(Uuid::now_v7().to_string());
         fs::create_dir(&path)?;
@@ -122,14 +126,14 @@ impl Draft {
     /// Moves the draft to its final place. It is then no longer removed on drop.
     pub(super) fn move_to(mut self, place: &Path) -> io::Result<()> {
         fs::rename(&self.path, place)?;
-        self.kept = true;
+        self.adopted = true;
         Ok(())
     }
 }
 
 impl Drop for Draft {
     fn drop(&mut self) {
-        if !self.kept
+        if !self.adopted
             && let Err(error) = fs::remove_dir_all(&self.path)
         {
             tracing::warn!(%error, "a draft could not be removed; the next start sweeps it");
@@ -146,22 +150,22 @@ mod tests {
     }
 
     #[test]
-    fn a_draft_that_is_not_adopted_leaves_nothing_behind() {
+    fn dropped_draft_leaves_nothing_behind() {
         let tmp = tempfile::tempdir().unwrap();
-        let work = Workplace::open(tmp.path()).unwrap();
-        let draft = work.draft("x").unwrap();
+        let drafts = Drafts::open(tmp.path()).unwrap();
+        let draft = drafts.draft("x").unwrap();
         fs::write(draft.path().join("video"), b"abc").unwrap();
         drop(draft);
-        work.close();
+        drafts.close();
         assert_eq!(n_entries(tmp.path()), 0);
     }
 
     #[test]
-    fn a_sweep_takes_what_the_dead_left_and_nothing_of_the_living() {
+    fn sweep_removes_drafts_of_ended_processes_only() {
         let tmp = tempfile::tempdir().unwrap();
-        let living = Workplace::open(tmp.path()).unwrap();
+        let living = Drafts::open(tmp.path()).unwrap();
         let draft = living.draft("x").unwrap();
-        let dead = Workplace::open(tmp.path()).unwrap();
+        let dead = Drafts::open(tmp.path()).unwrap();
         std::mem::forget(dead.draft("y").unwrap());
         assert_eq!(dead.sweep().unwrap(), 0);
         drop(dead);

@@ -2,25 +2,26 @@
 //! at their first use together. Without this check, a sweep with another database would find no rows for the
 //! files and delete them all.
 
-use super::{Place, hex};
+use super::{Backend, hex};
 use crate::store::tokens::random_key;
 use crate::store::{Error, Store, sql};
 
 impl Store {
-    /// Verifies that database and files have the same mark. Fails with [`Error::OtherFiles`] if they differ.
+    /// Verifies that database and files have the same mark. Fails with [`Error::ForeignFiles`] if they differ.
     ///
     /// A missing mark is added if the database knows at least one of the files, or if there are no files.
-    pub(in crate::store) async fn own_files(&self) -> Result<(), Error> {
+    pub(in crate::store) async fn check_identity(&self) -> Result<(), Error> {
         let of_rows = self.mark_of_rows().await?;
         let of_files = self.mark_of_files().await?;
         if let (Some(of_rows), Some(of_files)) = (&of_rows, &of_files) {
-            return match hex(of_rows) == *of_files {
-                true => Ok(()),
-                false => Err(Error::OtherFiles),
+            return if hex(of_rows) == *of_files {
+                Ok(())
+            } else {
+                Err(Error::ForeignFiles)
             };
         }
         if !self.knows_files().await? {
-            return Err(Error::OtherFiles);
+            return Err(Error::ForeignFiles);
         }
         let mark = match (of_rows, &of_files) {
             (Some(mark), _) => mark,
@@ -31,7 +32,7 @@ impl Store {
         match of_files {
             None => self.mark_files(&hex(&mark)).await,
             Some(of_files) if of_files == hex(&mark) => Ok(()),
-            Some(_) => Err(Error::OtherFiles),
+            Some(_) => Err(Error::ForeignFiles),
         }
     }
 
@@ -62,16 +63,16 @@ impl Store {
     }
 
     async fn mark_of_files(&self) -> Result<Option<String>, Error> {
-        match &self.blobs.place {
-            Place::Shelf(shelf) => Ok(shelf.mark()?),
-            Place::Bucket(bucket) => bucket.mark().await,
+        match &self.blobs.backend {
+            Backend::Local(local) => Ok(local.mark()?),
+            Backend::Bucket(bucket) => bucket.mark().await,
         }
     }
 
     async fn mark_files(&self, mark: &str) -> Result<(), Error> {
-        match &self.blobs.place {
-            Place::Shelf(shelf) => Ok(shelf.set_mark(mark)?),
-            Place::Bucket(bucket) => bucket.set_mark(mark).await,
+        match &self.blobs.backend {
+            Backend::Local(local) => Ok(local.set_mark(mark)?),
+            Backend::Bucket(bucket) => bucket.set_mark(mark).await,
         }
     }
 }
@@ -107,19 +108,19 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn rows_that_are_not_the_files_own_are_refused_before_anything_is_swept() {
+    async fn foreign_database_is_refused_and_nothing_is_swept() {
         let [own, other, files] = [(); 3].map(|()| tempfile::tempdir().unwrap());
         open(own.path(), files.path()).await.unwrap();
         let film = files.path().join("footage/a");
         fs::create_dir(&film).unwrap();
         let refused = open(other.path(), files.path()).await.unwrap_err();
-        assert!(matches!(refused, Error::OtherFiles), "{refused}");
+        assert!(matches!(refused, Error::ForeignFiles), "{refused}");
         assert!(film.is_dir());
         open(own.path(), files.path()).await.unwrap();
     }
 
     #[tokio::test]
-    async fn files_without_a_mark_are_taken_over_by_rows_that_know_them_alone() {
+    async fn unmarked_files_are_adopted_only_by_a_database_that_knows_them() {
         let [own, other, files] = [(); 3].map(|()| tempfile::tempdir().unwrap());
         let store = Store::open(storage(own.path(), files.path()))
             .await
@@ -142,7 +143,28 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn an_empty_place_for_files_is_anybodys() {
+    async fn broken_mark_of_files_is_refused_and_not_taken_over() {
+        let [rows, files] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+        let mark = files.path().join("store-id");
+        for broken in ["", "12", "not a mark"] {
+            fs::write(&mark, broken).unwrap();
+            let refused = open(rows.path(), files.path()).await;
+            assert!(matches!(refused, Err(Error::ForeignFiles)), "{broken:?}");
+        }
+        fs::remove_file(&mark).unwrap();
+        open(rows.path(), files.path()).await.unwrap();
+        assert_eq!(fs::read_to_string(&mark).unwrap().len(), 64);
+        let names = fs::read_dir(files.path()).unwrap();
+        let names = names.map(|entry| entry.unwrap().file_name());
+        assert!(
+            !names
+                .into_iter()
+                .any(|name| name.to_string_lossy().contains("new"))
+        );
+    }
+
+    #[tokio::test]
+    async fn empty_store_is_adopted_by_any_database() {
         let [own, other, files] = [(); 3].map(|()| tempfile::tempdir().unwrap());
         open(own.path(), files.path()).await.unwrap();
         open(other.path(), files.path()).await.unwrap();

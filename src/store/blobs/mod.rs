@@ -8,9 +8,9 @@
 
 mod bucket;
 mod draft;
+mod free_space;
 mod identity;
-mod room;
-mod shelf;
+mod local;
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -27,15 +27,12 @@ use tokio::io::{AsyncWrite, AsyncWriteExt};
 pub use draft::Draft;
 
 use bucket::Bucket;
-use draft::Workplace;
-use shelf::Shelf;
+use draft::Drafts;
+use local::LocalFolder;
 
 use super::{Error, Store, Transaction, sql};
 use crate::code::Code;
 use crate::config::{FileStore, Storage};
-
-/// Kinds of folders.
-const KINDS: [&str; 4] = ["footage", "libraries", "flocks", "fish"];
 
 /// Name of the file that holds the mark of the files (`identity`).
 const MARK: &str = "store-id";
@@ -54,15 +51,15 @@ pub struct BlobFile {
 /// The stored files, and the drafts of this process.
 #[derive(Clone, Debug)]
 pub struct Blobs {
-    place: Place,
-    work: Arc<Workplace>,
+    backend: Backend,
+    drafts: Arc<Drafts>,
     uploads: PathBuf,
 }
 
 /// Location of the stored files.
 #[derive(Clone, Debug)]
-enum Place {
-    Shelf(Shelf),
+enum Backend {
+    Local(LocalFolder),
     Bucket(Bucket),
 }
 
@@ -89,33 +86,29 @@ impl Blobs {
     pub(super) async fn open(storage: &Storage) -> Result<Blobs, Error> {
         let uploads = storage.data.join("uploads");
         fs::create_dir_all(&uploads)?;
-        let (place, tmp) = match &storage.store {
-            None => (storage.data.join("blobs"), storage.data.join("tmp")),
+        let open_local = |folder: &Path| LocalFolder::open(folder).map(Backend::Local);
+        let data = &storage.data;
+        let (backend, drafts) = match &storage.store {
+            None => (open_local(&data.join("blobs"))?, data.join("tmp")),
             // Drafts are renamed into this folder, so they must be on the same file system.
-            Some(FileStore::Folder(folder)) => (folder.clone(), folder.join("tmp")),
+            Some(FileStore::Folder(folder)) => (open_local(folder)?, folder.join("tmp")),
             Some(FileStore::Bucket { name, prefix }) => {
-                let place = Place::Bucket(Bucket::open(name, prefix).await?);
-                let work = Arc::new(Workplace::open(&storage.data.join("tmp"))?);
-                return Ok(Blobs {
-                    place,
-                    work,
-                    uploads,
-                });
+                let bucket = Bucket::open(name, prefix).await?;
+                (Backend::Bucket(bucket), data.join("tmp"))
             }
         };
-        let place = Place::Shelf(Shelf::open(&place)?);
-        let work = Arc::new(Workplace::open(&tmp)?);
-        shelf::sync_folder(&storage.data)?;
+        let drafts = Arc::new(Drafts::open(&drafts)?);
+        local::sync_folder(data)?;
         Ok(Blobs {
-            place,
-            work,
+            backend,
+            drafts,
             uploads,
         })
     }
 
     /// Creates a draft. The name must not have been used before.
     pub fn draft(&self, name: &str) -> io::Result<Draft> {
-        self.work.draft(name)
+        self.drafts.draft(name)
     }
 
     /// Syncs and hashes all files of a draft. Returns them in the order of their names. Blocks the thread.
@@ -133,17 +126,17 @@ impl Blobs {
 
     /// Stores a draft as `folder`. Its files must be synced.
     pub async fn adopt(&self, draft: Draft, folder: &str) -> Result<(), Error> {
-        match &self.place {
-            Place::Shelf(shelf) => shelf.adopt(draft, folder).await,
-            Place::Bucket(bucket) => bucket.put(draft.path(), folder).await,
+        match &self.backend {
+            Backend::Local(local) => local.adopt(draft, folder).await,
+            Backend::Bucket(bucket) => bucket.put(draft.path(), folder).await,
         }
     }
 
     /// Removes a folder that no row names. Succeeds also if it does not exist.
     pub async fn discard(&self, folder: &str) -> Result<(), Error> {
-        match &self.place {
-            Place::Shelf(shelf) => shelf.discard(folder).await,
-            Place::Bucket(bucket) => bucket.discard(folder).await,
+        match &self.backend {
+            Backend::Local(local) => local.discard(folder).await,
+            Backend::Bucket(bucket) => bucket.discard(folder).await,
         }
     }
 
@@ -155,9 +148,9 @@ impl Blobs {
         first: u64,
         n_bytes: u64,
     ) -> Result<BoxStream<'static, io::Result<Bytes>>, Error> {
-        match &self.place {
-            Place::Shelf(shelf) => shelf.read(folder, name, first, n_bytes).await,
-            Place::Bucket(bucket) => Ok(bucket.read(folder, name, first, n_bytes)),
+        match &self.backend {
+            Backend::Local(local) => local.read(folder, name, first, n_bytes).await,
+            Backend::Bucket(bucket) => Ok(bucket.read(folder, name, first, n_bytes)),
         }
     }
 
@@ -180,15 +173,15 @@ impl Blobs {
 
     /// Returns all stored folders, in no particular order.
     pub async fn folders(&self) -> Result<Vec<Folder>, Error> {
-        match &self.place {
-            Place::Shelf(shelf) => Ok(shelf.folders()?),
-            Place::Bucket(bucket) => bucket.folders().await,
+        match &self.backend {
+            Backend::Local(local) => Ok(local.folders()?),
+            Backend::Bucket(bucket) => bucket.folders().await,
         }
     }
 
     /// Returns the folder of the drafts of all processes.
     pub(super) fn tmp(&self) -> &Path {
-        self.work.folder()
+        self.drafts.folder()
     }
 
     /// Returns the folder of this machine's unfinished uploads.
@@ -197,17 +190,17 @@ impl Blobs {
     }
 
     /// Returns the drafts.
-    pub(super) fn work(&self) -> &Workplace {
-        &self.work
+    pub(super) fn drafts(&self) -> &Drafts {
+        &self.drafts
     }
 }
 
-impl Place {
+impl Backend {
     /// Returns whether the location answers. A local folder always does.
-    async fn is_there(&self) -> bool {
+    async fn answers(&self) -> bool {
         match self {
-            Place::Shelf(_) => true,
-            Place::Bucket(bucket) => bucket.answers().await,
+            Backend::Local(_) => true,
+            Backend::Bucket(bucket) => bucket.answers().await,
         }
     }
 }
@@ -228,16 +221,16 @@ impl Store {
     }
 
     /// Returns local copies of those files of a folder that exist. If the store is local, returns the stored
-    /// files themselves. Fails with [`Error::Altered`] if a copy does not match its recorded size and hash.
+    /// files themselves. Fails with [`Error::CorruptFile`] if a copy does not match its recorded size and hash.
     pub async fn fetch(&self, folder: &str, names: &[&str]) -> Result<Fetched, Error> {
-        let bucket = match &self.blobs.place {
-            Place::Shelf(shelf) => {
+        let bucket = match &self.blobs.backend {
+            Backend::Local(local) => {
                 return Ok(Fetched {
-                    path: shelf.folder(folder),
+                    path: local.folder(folder),
                     _copy: None,
                 });
             }
-            Place::Bucket(bucket) => bucket,
+            Backend::Bucket(bucket) => bucket,
         };
         let draft = self.blobs.draft(&sqlx::types::Uuid::now_v7().to_string())?;
         for name in names {
@@ -247,7 +240,7 @@ impl Store {
             let mut copy = tokio::fs::File::create_new(draft.path().join(name)).await?;
             let bytes = bucket.read(folder, name, 0, blob.size_bytes.unsigned_abs());
             if write_and_hash(bytes, &mut copy).await? != (blob.size_bytes, blob.sha256) {
-                return Err(Error::Altered(format!("{folder}/{name}")));
+                return Err(Error::CorruptFile(format!("{folder}/{name}")));
             }
         }
         Ok(Fetched {
@@ -271,12 +264,7 @@ impl Store {
     pub async fn is_linked_after(&self, folder: &str, error: &Error) -> Result<bool, Error> {
         match self.is_folder_known(folder).await {
             Ok(true) => return Ok(true),
-            Ok(false)
-                if matches!(
-                    error,
-                    Error::Sql(sqlx::Error::Database(_)) | Error::FilmIsKnown
-                ) || error.code() == Code::StorageFull =>
-            {
+            Ok(false) if is_rejection(error) => {
                 self.blobs.discard(folder).await?;
             }
             Ok(false) => tracing::warn!(
@@ -291,6 +279,14 @@ impl Store {
         }
         Ok(false)
     }
+}
+
+/// Returns whether the database rejected a transaction, so that its commit cannot be in progress.
+fn is_rejection(error: &Error) -> bool {
+    matches!(
+        error,
+        Error::Sql(sqlx::Error::Database(_)) | Error::AlreadyStored
+    ) || error.code() == Code::StorageFull
 }
 
 /// Adds the rows of a folder's files. Must run in the transaction that adds the row of the footage or result.

@@ -3,7 +3,7 @@
 use super::JobState;
 use super::follow::cancel_followers;
 use crate::ids::JobId;
-use crate::store::owners::Reach;
+use crate::store::owners::OwnerFilter;
 use crate::store::{Error, Store, sql};
 
 /// Result of [`Store::cancel`].
@@ -21,39 +21,44 @@ pub enum Cancel {
 
 impl Store {
     /// Cancels a queued job immediately, or asks the worker of a running job to stop.
-    pub async fn cancel(&self, job: JobId, reach: &Reach, now_ms: i64) -> Result<Cancel, Error> {
-        let cancel = || self.cancel_now(job, reach, now_ms);
+    pub async fn cancel(
+        &self,
+        job: JobId,
+        owners: &OwnerFilter,
+        now_ms: i64,
+    ) -> Result<Cancel, Error> {
+        let cancel = || async {
+            let mut transaction = self.writer.begin().await?;
+            let sql =
+                "select state from jobs where id = $1 and ($2 is null or owner = $2) for update";
+            let state: Option<String> = sql::query_scalar(sql)
+                .bind(job.0)
+                .bind(owners.parameter())
+                .fetch_optional(&mut transaction)
+                .await?;
+            let Some(state) = state else {
+                return Ok(Cancel::Absent);
+            };
+            let met = match JobState::try_from(state)? {
+                JobState::Queued => {
+                    let sql = "update jobs set state = 'cancelled', finished_ms = $2 where id = $1";
+                    let update = sql::query(sql).bind(job.0).bind(now_ms);
+                    update.execute(&mut transaction).await?;
+                    cancel_followers(&mut transaction, job.0, now_ms).await?;
+                    Cancel::Cancelled
+                }
+                JobState::Running => {
+                    let update =
+                        sql::query("update jobs set cancel_requested = true where id = $1");
+                    update.bind(job.0).execute(&mut transaction).await?;
+                    Cancel::Requested
+                }
+                ended => Cancel::Final(ended),
+            };
+            transaction.commit().await?;
+            tracing::info!(job.id = %job, ?met, "job cancellation requested");
+            Ok(met)
+        };
         self.reserve.lend(cancel).await
-    }
-
-    async fn cancel_now(&self, job: JobId, reach: &Reach, now_ms: i64) -> Result<Cancel, Error> {
-        let mut transaction = self.writer.begin().await?;
-        let sql = "select state from jobs where id = $1 and ($2 is null or owner = $2) for update";
-        let state: Option<String> = sql::query_scalar(sql)
-            .bind(job.0)
-            .bind(reach.owner())
-            .fetch_optional(&mut transaction)
-            .await?;
-        let Some(state) = state else {
-            return Ok(Cancel::Absent);
-        };
-        let met = match JobState::from_name(&state)? {
-            JobState::Queued => {
-                let sql = "update jobs set state = 'cancelled', finished_ms = $2 where id = $1";
-                let update = sql::query(sql).bind(job.0).bind(now_ms);
-                update.execute(&mut transaction).await?;
-                cancel_followers(&mut transaction, job.0, now_ms).await?;
-                Cancel::Cancelled
-            }
-            JobState::Running => {
-                let update = sql::query("update jobs set cancel_requested = true where id = $1");
-                update.bind(job.0).execute(&mut transaction).await?;
-                Cancel::Requested
-            }
-            ended => Cancel::Final(ended),
-        };
-        transaction.commit().await?;
-        tracing::info!(job.id = %job, ?met, "job cancellation requested");
-        Ok(met)
     }
 }

@@ -5,8 +5,8 @@
 
 use sqlx::types::Uuid;
 
-use super::read::{JobRow, Row, columns};
-use crate::store::owners::Reach;
+use super::read::{JobRow, SELECT};
+use crate::store::owners::OwnerFilter;
 use crate::store::{Error, Store, sql};
 
 /// Maximum number of ended jobs that a resumed stream reports. Free choice.
@@ -17,20 +17,21 @@ const MAX_UNDER_WAY: i64 = 10_000;
 impl Store {
     /// Returns the visible jobs that are queued, running, or were created since `since_ms`. At most the
     /// 10,000 newest, oldest first.
-    pub async fn jobs_under_way(&self, since_ms: i64, reach: &Reach) -> Result<Vec<JobRow>, Error> {
-        let sql = concat!(
-            "select ",
-            columns!(),
-            " from jobs where (state in ('queued', 'running') or id >= $1) \
-             and ($2 is null or owner = $2) order by id desc limit $3"
-        );
-        let rows: Vec<Row> = sql::query(sql)
+    pub async fn jobs_under_way(
+        &self,
+        since_ms: i64,
+        owners: &OwnerFilter,
+    ) -> Result<Vec<JobRow>, Error> {
+        let filter = "where (state in ('queued', 'running') or id >= $1) \
+                      and ($2 is null or owner = $2) order by id desc limit $3";
+        let mut rows: Vec<JobRow> = sql::query(format!("{SELECT} {filter}"))
             .bind(first_id_of(since_ms))
-            .bind(reach.owner())
+            .bind(owners.parameter())
             .bind(MAX_UNDER_WAY)
             .fetch_all(&self.reader)
             .await?;
-        rows.into_iter().rev().map(JobRow::try_from).collect()
+        rows.reverse();
+        Ok(rows)
     }
 
     /// Returns whether any owner has a queued or running job.
@@ -40,20 +41,18 @@ impl Store {
     }
 
     /// Returns the visible jobs that ended since `since_ms`. At most the 1000 that ended last, latest first.
-    pub async fn jobs_ended(&self, since_ms: i64, reach: &Reach) -> Result<Vec<JobRow>, Error> {
-        let sql = concat!(
-            "select ",
-            columns!(),
-            " from jobs where finished_ms >= $1 and ($2 is null or owner = $2) \
-             order by finished_ms desc limit $3"
-        );
-        let rows: Vec<Row> = sql::query(sql)
+    pub async fn jobs_ended(
+        &self,
+        since_ms: i64,
+        owners: &OwnerFilter,
+    ) -> Result<Vec<JobRow>, Error> {
+        let filter = "where finished_ms >= $1 and ($2 is null or owner = $2) \
+                      order by finished_ms desc limit $3";
+        let rows = sql::query(format!("{SELECT} {filter}"))
             .bind(since_ms)
-            .bind(reach.owner())
-            .bind(MAX_ENDED)
-            .fetch_all(&self.reader)
-            .await?;
-        rows.into_iter().map(JobRow::try_from).collect()
+            .bind(owners.parameter())
+            .bind(MAX_ENDED);
+        Ok(rows.fetch_all(&self.reader).await?)
     }
 }
 
@@ -67,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_id_made_later_is_not_before_the_first_of_its_time() {
+    fn first_id_of_a_time_precedes_ids_made_then() {
         let id = Uuid::now_v7();
         let (seconds, nanos) = id.get_timestamp().unwrap().to_unix();
         let made_ms = seconds as i64 * 1000 + i64::from(nanos) / 1_000_000;

@@ -3,8 +3,7 @@
 
 use sqlx::types::Uuid;
 
-use super::{Kind, Lease};
-use crate::ids::JobId;
+use super::Lease;
 use crate::store::{Error, Store, sql};
 
 impl Store {
@@ -19,7 +18,7 @@ impl Store {
         now_ms: i64,
         lease_ms: i64,
     ) -> Result<Option<Lease>, Error> {
-        let row: Option<(Uuid, String, String, Uuid, i64, i64)> = sql::query(
+        let lease: Option<Lease> = sql::query(
             "with turns (owner, n_running, last_ms) as ( \
                  select owner, (select count(*) from jobs r \
                                 where r.owner = q.owner and r.state = 'running'), \
@@ -34,24 +33,16 @@ impl Store {
                  and (j.after_job is null \
                       or exists (select 1 from jobs a where a.id = j.after_job and a.state = 'done')) \
                  order by t.n_running, j.priority desc, coalesce(t.last_ms, 0), j.id limit 1 for update of j skip locked) \
-             returning id, kind, input, result_id, attempt, fence",
+             returning id as job_id, kind, input, result_id, attempt, fence",
         )
         .bind(worker)
         .bind(now_ms)
         .bind(now_ms + lease_ms)
         .fetch_optional(&self.writer)
         .await?;
-        let Some((id, kind, input, result_id, attempt, fence)) = row else {
-            return Ok(None);
-        };
-        tracing::info!(job.id = %id, job.kind = kind, attempt, fence, "job claimed");
-        Ok(Some(Lease {
-            job_id: JobId(id),
-            kind: Kind::from_name(&kind)?,
-            input,
-            result_id,
-            attempt,
-            fence,
-        }))
+        if let Some(lease) = &lease {
+            tracing::info!(job.id = %lease.job_id, job.kind = lease.kind.name(), attempt = lease.attempt, fence = lease.fence, "job claimed");
+        }
+        Ok(lease)
     }
 }

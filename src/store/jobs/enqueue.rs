@@ -30,7 +30,7 @@ pub struct NewJob {
     /// Jobs of higher priority run first. The usual value is 0.
     pub priority: i64,
     /// Maximum number of queued and running jobs of all owners, including this one.
-    pub room: i64,
+    pub max_queued: i64,
 }
 
 impl Store {
@@ -65,11 +65,11 @@ impl Store {
         .bind(now_ms)
         .bind(&job.account.owner)
         .bind(job.account.quota)
-        .bind(job.room)
+        .bind(job.max_queued)
         .execute(&mut transaction)
         .await?;
         if added == 0 {
-            return Err(why_not(&mut transaction, job).await?);
+            return Err(exceeded_limit(&mut transaction, job).await?);
         }
         end_with_predecessor(&mut transaction, job, now_ms).await?;
         transaction.notify(QUEUED).await?;
@@ -92,7 +92,7 @@ impl QueuedJobs {
     ///
     /// An error means that the connection is lost. The caller must then subscribe again.
     pub async fn next(&mut self) -> Result<(), Error> {
-        Ok(self.0.heard().await?)
+        Ok(self.0.next().await?)
     }
 }
 
@@ -110,7 +110,7 @@ async fn end_with_predecessor(
     let sql = "select state from jobs where id = $1 for update";
     let state = sql::query_scalar(sql).bind(before.0);
     let state: Option<String> = state.fetch_optional(&mut *transaction).await?;
-    match state.as_deref().map(JobState::from_name).transpose()? {
+    match state.map(JobState::try_from).transpose()? {
         Some(JobState::Failed) => fail_followers(transaction, before.0, now_ms).await?,
         Some(JobState::Cancelled) => cancel_followers(transaction, before.0, now_ms).await?,
         _ => {}
@@ -119,13 +119,15 @@ async fn end_with_predecessor(
 }
 
 /// Returns the limit that refused the job. If both limits are reached, returns that of the owner.
-async fn why_not(transaction: &mut Transaction, job: &NewJob) -> Result<Error, Error> {
+async fn exceeded_limit(transaction: &mut Transaction, job: &NewJob) -> Result<Error, Error> {
     let sql = "select count(*) from jobs where owner = $1 and state in ('queued', 'running')";
     let count = sql::query_scalar(sql).bind(&job.account.owner);
     let n_jobs: i64 = count.fetch_one(transaction).await?;
     Ok(match job.account.quota {
         Some(quota) if quota <= n_jobs => Error::QuotaExceeded { quota },
-        _ => Error::QueueFull { room: job.room },
+        _ => Error::QueueFull {
+            max_queued: job.max_queued,
+        },
     })
 }
 
@@ -146,7 +148,7 @@ mod tests {
     use crate::code::Code;
     use crate::store::fresh;
     use crate::store::jobs::Change;
-    use crate::store::owners::Reach;
+    use crate::store::owners::OwnerFilter;
 
     fn job_after(after_job: Option<JobId>) -> NewJob {
         NewJob {
@@ -157,20 +159,20 @@ mod tests {
             result_id: Uuid::now_v7(),
             after_job,
             priority: 0,
-            room: 100,
+            max_queued: 100,
         }
     }
 
     #[tokio::test]
-    async fn a_job_that_comes_after_the_end_of_the_one_it_waits_for_does_not_wait_for_ever() {
+    async fn new_follower_of_an_ended_job_ends_at_once() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let state_after = async |before: &NewJob| {
             let follower = job_after(Some(before.job_id));
             store.enqueue(&follower, 7).await.unwrap();
-            let row = store.job(follower.job_id, &Reach::All).await;
+            let row = store.job(follower.job_id, &OwnerFilter::All).await;
             let row = row.unwrap().unwrap();
-            (row.state, row.failure.map(|(code, _)| code))
+            (row.state, row.failure().map(|failure| failure.code))
         };
         let (failed, cancelled) = (job_after(None), job_after(None));
         store.enqueue(&failed, 0).await.unwrap();
@@ -184,7 +186,7 @@ mod tests {
         assert_eq!(late, (JobState::Failed, Some(Code::InputFailed)));
         store.enqueue(&cancelled, 0).await.unwrap();
         store
-            .cancel(cancelled.job_id, &Reach::All, 3)
+            .cancel(cancelled.job_id, &OwnerFilter::All, 3)
             .await
             .unwrap();
         assert_eq!(state_after(&cancelled).await, (JobState::Cancelled, None));

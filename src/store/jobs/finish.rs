@@ -4,14 +4,15 @@
 use sqlx::types::Uuid;
 
 use super::{Change, Lease};
-use crate::store::footage::{self, Filmed};
-use crate::store::{BlobFile, Error, Store, Transaction, blobs, fish, flocks, libraries, sql};
+use crate::store::footage::{self, SampleFootage};
+use crate::store::resources::ResourceKind;
+use crate::store::{BlobFile, Error, Store, Transaction, blobs, sql};
 
 /// Output of a finished job: files that are already stored, and the values of the result's row.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// Kind of the result, and its source.
-    pub made: Made,
+    /// What the result was made from.
+    pub source: Source,
     /// Folder in the blob store.
     pub folder: String,
     /// Files in the folder.
@@ -22,17 +23,13 @@ pub struct Outcome {
     pub summary: String,
 }
 
-/// Kind of a result, with the id of the footage or library that it was made from.
+/// What a result was made from.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Made {
-    /// The sample footage; made from nothing.
-    Sample(Filmed),
-    /// A library made from this footage.
-    Library(Uuid),
-    /// A flock made from this library.
-    Flock(Uuid),
-    /// A virtual fish made from this library.
-    Fish(Uuid),
+pub enum Source {
+    /// Nothing: the sample job filmed this footage.
+    Nothing(SampleFootage),
+    /// The footage or library with this id.
+    Resource(Uuid),
 }
 
 impl Store {
@@ -44,35 +41,28 @@ impl Store {
         outcome: &Outcome,
         now_ms: i64,
     ) -> Result<Change, Error> {
-        let finish = || self.finish_now(lease, outcome, now_ms);
+        let finish = || async {
+            let mut transaction = self.writer.begin().await?;
+            let n_rows = sql::query(
+                "update jobs set state = 'done', worker = null, lease_until_ms = null, stage = null, \
+                 progress = 1, finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
+            )
+            .bind(lease.job_id.0)
+            .bind(lease.fence)
+            .bind(now_ms)
+            .execute(&mut transaction)
+            .await?;
+            if Change::from_rows(n_rows) == Change::Lost {
+                tracing::warn!(job.id = %lease.job_id, fence = lease.fence, "job result discarded: its lease was lost");
+                return Ok(Change::Lost);
+            }
+            blobs::insert(&mut transaction, &outcome.folder, &outcome.files).await?;
+            insert(&mut transaction, lease, outcome, now_ms).await?;
+            transaction.commit().await?;
+            tracing::info!(job.id = %lease.job_id, fence = lease.fence, "job done");
+            Ok(Change::Made)
+        };
         self.reserve.lend(finish).await
-    }
-
-    async fn finish_now(
-        &self,
-        lease: &Lease,
-        outcome: &Outcome,
-        now_ms: i64,
-    ) -> Result<Change, Error> {
-        let mut transaction = self.writer.begin().await?;
-        let n_rows = sql::query(
-            "update jobs set state = 'done', worker = null, lease_until_ms = null, stage = null, \
-             progress = 1, finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
-        )
-        .bind(lease.job_id.0)
-        .bind(lease.fence)
-        .bind(now_ms)
-        .execute(&mut transaction)
-        .await?;
-        if Change::of_rows(n_rows) == Change::Lost {
-            tracing::warn!(job.id = %lease.job_id, fence = lease.fence, "job result discarded: its lease was lost");
-            return Ok(Change::Lost);
-        }
-        blobs::insert(&mut transaction, &outcome.folder, &outcome.files).await?;
-        insert(&mut transaction, lease, outcome, now_ms).await?;
-        transaction.commit().await?;
-        tracing::info!(job.id = %lease.job_id, fence = lease.fence, "job done");
-        Ok(Change::Made)
     }
 }
 
@@ -90,26 +80,33 @@ async fn insert(
     outcome: &Outcome,
     now_ms: i64,
 ) -> Result<(), Error> {
-    let (sql, made_of) = match outcome.made {
-        Made::Sample(filmed) => {
-            let film = (&filmed, outcome.folder.as_str(), &outcome.files[..]);
-            return footage::insert_filmed(transaction, lease, film, now_ms).await;
+    let source_id = match &outcome.source {
+        Source::Resource(id) => *id,
+        Source::Nothing(sample) => {
+            return footage::insert_sample(transaction, lease, outcome, sample, now_ms).await;
         }
-        Made::Library(footage_id) => (libraries::INSERT, footage_id),
-        Made::Flock(library_id) => (flocks::INSERT, library_id),
-        Made::Fish(library_id) => (fish::INSERT, library_id),
     };
-    sql::query(sql)
-        .bind(lease.result_id)
-        .bind(lease.job_id.0)
-        .bind(lease.fence)
-        .bind(made_of)
-        .bind(&outcome.folder)
-        .bind(&outcome.params)
-        .bind(&outcome.summary)
-        .bind(outcome.size_bytes())
-        .bind(now_ms)
-        .execute(transaction)
-        .await?;
+    let kind = lease.kind.result_kind();
+    let source_column = match kind {
+        ResourceKind::Library => "footage_id",
+        _ => "library_id",
+    };
+    sql::query(format!(
+        "insert into {} (id, job_id, fence, {source_column}, folder, params, summary, size_bytes, \
+         created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
+         (select owner from jobs where id = $2))",
+        kind.plural()
+    ))
+    .bind(lease.result_id)
+    .bind(lease.job_id.0)
+    .bind(lease.fence)
+    .bind(source_id)
+    .bind(&outcome.folder)
+    .bind(&outcome.params)
+    .bind(&outcome.summary)
+    .bind(outcome.size_bytes())
+    .bind(now_ms)
+    .execute(transaction)
+    .await?;
     Ok(())
 }

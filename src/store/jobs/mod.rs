@@ -29,6 +29,7 @@ mod tests;
 use sqlx::types::Uuid;
 
 use super::Error;
+use super::resources::ResourceKind;
 use crate::ids::JobId;
 
 /// Kinds of jobs.
@@ -60,11 +61,13 @@ pub enum JobState {
 }
 
 /// The right to work on a job until the lease expires, and to finish it while the fence is valid.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
 pub struct Lease {
     /// Id of the job.
+    #[sqlx(try_from = "Uuid")]
     pub job_id: JobId,
     /// Kind of the job.
+    #[sqlx(try_from = "String")]
     pub kind: Kind,
     /// Input of the job, JSON.
     pub input: String,
@@ -100,9 +103,14 @@ impl Kind {
         }
     }
 
-    pub(super) fn from_name(name: &str) -> Result<Kind, Error> {
-        let found = Kind::ALL.into_iter().find(|kind| kind.name() == name);
-        found.ok_or_else(|| unknown(name))
+    /// Returns the kind of the job's result.
+    pub fn result_kind(self) -> ResourceKind {
+        match self {
+            Kind::Sample => ResourceKind::Footage,
+            Kind::Analysis => ResourceKind::Library,
+            Kind::Flock => ResourceKind::Flock,
+            Kind::Fish => ResourceKind::Fish,
+        }
     }
 }
 
@@ -134,15 +142,10 @@ impl JobState {
             JobState::Done | JobState::Failed | JobState::Cancelled => true,
         }
     }
-
-    pub(super) fn from_name(name: &str) -> Result<JobState, Error> {
-        let found = JobState::ALL.into_iter().find(|state| state.name() == name);
-        found.ok_or_else(|| unknown(name))
-    }
 }
 
 impl Change {
-    fn of_rows(n_rows: u64) -> Change {
+    fn from_rows(n_rows: u64) -> Change {
         match n_rows {
             0 => Change::Lost,
             _ => Change::Made,
@@ -150,9 +153,27 @@ impl Change {
     }
 }
 
-fn unknown(value: &str) -> Error {
+impl TryFrom<String> for Kind {
+    type Error = Error;
+
+    fn try_from(name: String) -> Result<Kind, Error> {
+        let found = Kind::ALL.into_iter().find(|kind| kind.name() == name);
+        found.ok_or_else(|| unknown(name))
+    }
+}
+
+impl TryFrom<String> for JobState {
+    type Error = Error;
+
+    fn try_from(name: String) -> Result<JobState, Error> {
+        let found = JobState::ALL.into_iter().find(|state| state.name() == name);
+        found.ok_or_else(|| unknown(name))
+    }
+}
+
+fn unknown(value: String) -> Error {
     Error::UnknownValue {
         table: "jobs",
-        value: value.to_owned(),
+        value,
     }
 }

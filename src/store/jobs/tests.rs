@@ -5,12 +5,13 @@ use tempfile::TempDir;
 
 use super::cancel::Cancel;
 use super::enqueue::NewJob;
-use super::finish::{Made, Outcome};
+use super::finish::{Outcome, Source};
 use super::heartbeat::Beat;
 use super::*;
 use crate::code::Code;
 use crate::store::Store;
-use crate::store::owners::{Account, Owner, Reach};
+use crate::store::owners::{Account, Owner, OwnerFilter};
+use crate::store::resources::Fish;
 use crate::store::{fresh, sql};
 
 const LEASE_MS: i64 = 15_000;
@@ -51,7 +52,7 @@ impl Queue {
             result_id: Uuid::now_v7(),
             after_job,
             priority,
-            room: 1_000,
+            max_queued: 1_000,
         };
         self.store.enqueue(&job, 0).await?;
         Ok(job_id)
@@ -64,7 +65,7 @@ impl Queue {
 
     async fn state(&self, job: JobId) -> JobState {
         self.store
-            .job(job, &Reach::All)
+            .job(job, &OwnerFilter::All)
             .await
             .unwrap()
             .unwrap()
@@ -75,7 +76,7 @@ impl Queue {
     async fn finish(&self, lease: &Lease) -> Change {
         let library = self.library().await;
         let outcome = Outcome {
-            made: Made::Fish(library),
+            source: Source::Resource(library),
             folder: format!("fish/{}.{}", lease.result_id, lease.fence),
             files: Vec::new(),
             params: "{}".into(),
@@ -111,7 +112,7 @@ impl Queue {
 }
 
 #[tokio::test]
-async fn jobs_are_claimed_by_priority_and_then_in_turn_each_once() {
+async fn jobs_are_claimed_once_by_priority_and_age() {
     let queue = Queue::open().await;
     let first = queue.enqueue(None).await;
     let second = queue.enqueue(None).await;
@@ -124,7 +125,7 @@ async fn jobs_are_claimed_by_priority_and_then_in_turn_each_once() {
 }
 
 #[tokio::test]
-async fn a_heartbeat_keeps_the_job_from_being_rescued() {
+async fn heartbeat_prevents_rescue() {
     let queue = Queue::open().await;
     queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
@@ -136,7 +137,7 @@ async fn a_heartbeat_keeps_the_job_from_being_rescued() {
 }
 
 #[tokio::test]
-async fn finishing_links_the_result_in_the_same_step() {
+async fn finish_links_the_result() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
@@ -144,7 +145,7 @@ async fn finishing_links_the_result_in_the_same_step() {
     assert_eq!(queue.state(job).await, JobState::Done);
     let fish = queue
         .store
-        .fish(lease.result_id, &Reach::All)
+        .resource::<Fish>(lease.result_id, &OwnerFilter::All)
         .await
         .unwrap()
         .unwrap();
@@ -152,7 +153,7 @@ async fn finishing_links_the_result_in_the_same_step() {
 }
 
 #[tokio::test]
-async fn a_worker_that_was_given_up_changes_nothing() {
+async fn worker_with_an_old_fence_changes_nothing() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     let stale = queue.claim(0).await.unwrap();
@@ -175,7 +176,7 @@ async fn a_worker_that_was_given_up_changes_nothing() {
 }
 
 #[tokio::test]
-async fn a_rescued_job_keeps_its_attempt_count() {
+async fn rescued_job_keeps_its_attempt_count() {
     let queue = Queue::open().await;
     queue.enqueue(None).await;
     queue.claim(0).await.unwrap();
@@ -184,21 +185,26 @@ async fn a_rescued_job_keeps_its_attempt_count() {
 }
 
 #[tokio::test]
-async fn a_job_that_kills_its_worker_twice_is_quarantined() {
+async fn job_is_quarantined_after_two_crashes() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     for _ in 0..2 {
         queue.claim(0).await.unwrap();
         queue.store.rescue_all(1).await.unwrap();
     }
-    let row = queue.store.job(job, &Reach::All).await.unwrap().unwrap();
+    let row = queue
+        .store
+        .job(job, &OwnerFilter::All)
+        .await
+        .unwrap()
+        .unwrap();
     assert_eq!(row.state, JobState::Failed);
-    assert_eq!(row.failure.unwrap().0, Code::CrashedWorker);
+    assert_eq!(row.failure().unwrap().code, Code::CrashedWorker);
     assert_eq!(queue.claim(i64::MAX - LEASE_MS).await, None);
 }
 
 #[tokio::test]
-async fn a_retried_job_waits_for_its_time_and_counts_the_attempt() {
+async fn retried_job_waits_and_counts_the_attempt() {
     let queue = Queue::open().await;
     queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
@@ -209,7 +215,7 @@ async fn a_retried_job_waits_for_its_time_and_counts_the_attempt() {
 }
 
 #[tokio::test]
-async fn a_released_job_has_not_used_its_attempt() {
+async fn released_job_does_not_count_the_attempt() {
     let queue = Queue::open().await;
     queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
@@ -219,25 +225,33 @@ async fn a_released_job_has_not_used_its_attempt() {
 }
 
 #[tokio::test]
-async fn a_queued_job_is_cancelled_at_once_with_what_follows_it() {
+async fn queued_job_is_cancelled_with_its_followers() {
     let queue = Queue::open().await;
     let first = queue.enqueue(None).await;
     let second = queue.enqueue(Some(first)).await;
     let third = queue.enqueue(Some(second)).await;
-    let met = queue.store.cancel(first, &Reach::All, 1).await.unwrap();
+    let met = queue
+        .store
+        .cancel(first, &OwnerFilter::All, 1)
+        .await
+        .unwrap();
     assert_eq!(met, Cancel::Cancelled);
     assert_eq!(queue.state(third).await, JobState::Cancelled);
-    let met = queue.store.cancel(first, &Reach::All, 2).await.unwrap();
+    let met = queue
+        .store
+        .cancel(first, &OwnerFilter::All, 2)
+        .await
+        .unwrap();
     assert_eq!(met, Cancel::Final(JobState::Cancelled));
 }
 
 #[tokio::test]
-async fn a_running_job_learns_of_its_cancelling_by_its_heartbeat() {
+async fn heartbeat_reports_a_cancel_request() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
     assert_eq!(
-        queue.store.cancel(job, &Reach::All, 1).await.unwrap(),
+        queue.store.cancel(job, &OwnerFilter::All, 1).await.unwrap(),
         Cancel::Requested
     );
     let beat = queue.store.heartbeat(&lease, 1, "", 0.0).await.unwrap();
@@ -247,12 +261,12 @@ async fn a_running_job_learns_of_its_cancelling_by_its_heartbeat() {
 }
 
 #[tokio::test]
-async fn a_job_whose_worker_died_before_it_could_be_cancelled_is_cancelled() {
+async fn rescue_cancels_a_job_with_a_cancel_request() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     queue.claim(0).await.unwrap();
     assert_eq!(
-        queue.store.cancel(job, &Reach::All, 1).await.unwrap(),
+        queue.store.cancel(job, &OwnerFilter::All, 1).await.unwrap(),
         Cancel::Requested
     );
     queue.store.rescue_all(2).await.unwrap();
@@ -260,7 +274,7 @@ async fn a_job_whose_worker_died_before_it_could_be_cancelled_is_cancelled() {
 }
 
 #[tokio::test]
-async fn a_job_that_follows_waits_until_the_first_is_done() {
+async fn follower_waits_until_its_predecessor_is_done() {
     let queue = Queue::open().await;
     let first = queue.enqueue(None).await;
     let second = queue.enqueue_at(Some(first), 9).await;
@@ -272,7 +286,7 @@ async fn a_job_that_follows_waits_until_the_first_is_done() {
 }
 
 #[tokio::test]
-async fn a_job_that_follows_a_failed_one_fails_with_it() {
+async fn follower_of_a_failed_job_fails() {
     let queue = Queue::open().await;
     let first = queue.enqueue(None).await;
     let second = queue.enqueue(Some(first)).await;
@@ -281,12 +295,44 @@ async fn a_job_that_follows_a_failed_one_fails_with_it() {
         .store
         .fail(&lease, Code::NothingMoves, "still", None, 1);
     assert_eq!(failed.await.unwrap(), Change::Made);
-    let row = queue.store.job(second, &Reach::All).await.unwrap().unwrap();
-    assert_eq!(row.failure.unwrap().0, Code::InputFailed);
+    let row = queue
+        .store
+        .job(second, &OwnerFilter::All)
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(row.failure().unwrap().code, Code::InputFailed);
 }
 
 #[tokio::test]
-async fn claims_that_race_give_each_job_to_one_worker() {
+async fn ended_job_has_no_stage() {
+    let queue = Queue::open().await;
+    let running = async || {
+        queue.enqueue(None).await;
+        let lease = queue.claim(0).await.unwrap();
+        let beat = queue.store.heartbeat(&lease, i64::MAX, "tracking", 0.5);
+        assert_eq!(beat.await.unwrap(), Beat::Held);
+        lease
+    };
+    let stage = async |lease: &Lease| {
+        let row = queue.store.job(lease.job_id, &OwnerFilter::All).await;
+        row.unwrap().unwrap().stage
+    };
+    let done = running().await;
+    assert_eq!(stage(&done).await.as_deref(), Some("tracking"));
+    assert_eq!(queue.finish(&done).await, Change::Made);
+    assert_eq!(stage(&done).await, None);
+    let failed = running().await;
+    let failure = queue.store.fail(&failed, Code::Internal, "", None, 1);
+    assert_eq!(failure.await.unwrap(), Change::Made);
+    assert_eq!(stage(&failed).await, None, "failed");
+    let stopped = running().await;
+    assert_eq!(queue.store.stop(&stopped, 1).await.unwrap(), Change::Made);
+    assert_eq!(stage(&stopped).await, None, "cancelled");
+}
+
+#[tokio::test]
+async fn concurrent_claims_give_each_job_to_one_worker() {
     let queue = Queue::open().await;
     for _ in 0..100 {
         queue.enqueue(None).await;
@@ -310,7 +356,7 @@ async fn claims_that_race_give_each_job_to_one_worker() {
 }
 
 #[tokio::test]
-async fn a_folder_is_served_by_one_process_at_a_time() {
+async fn second_store_in_a_folder_is_refused() {
     let data = tempfile::tempdir().unwrap();
     let first = Store::open(data.path()).await.unwrap();
     let second = Store::open(data.path()).await;
@@ -352,13 +398,13 @@ async fn n_before_the_other(n_workers: usize) -> usize {
 }
 
 #[tokio::test]
-async fn whoever_queues_one_job_does_not_wait_for_five_hundred_of_another() {
+async fn one_job_does_not_wait_for_five_hundred_of_another_owner() {
     assert_eq!(n_before_the_other(1).await, 0);
     assert_eq!(n_before_the_other(3).await, 0);
 }
 
 #[tokio::test]
-async fn owners_take_turns_job_by_job() {
+async fn owners_take_turns() {
     let queue = Queue::open().await;
     let mut jobs = Vec::new();
     for owner in ["a", "a", "a", "b", "b"] {
@@ -374,7 +420,7 @@ async fn owners_take_turns_job_by_job() {
 }
 
 #[tokio::test]
-async fn no_more_jobs_are_queued_or_running_than_the_quota_allows() {
+async fn quota_limits_queued_and_running_jobs() {
     let queue = Queue::open().await;
     let charge = async || queue.charge(of("a", 2), None, 0).await;
     charge().await.unwrap();

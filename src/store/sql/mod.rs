@@ -29,7 +29,7 @@ const ROW_LOCKS: [&str; 3] = [
 
 /// A statement with its parameters.
 pub(super) struct Query {
-    sql: &'static str,
+    sql: Cow<'static, str>,
     values: Vec<Value>,
 }
 
@@ -37,15 +37,15 @@ pub(super) struct Query {
 pub(super) struct ScalarQuery(Query);
 
 /// Returns a statement without parameters. The first bound value becomes `$1`.
-pub(super) fn query(sql: &'static str) -> Query {
+pub(super) fn query(sql: impl Into<Cow<'static, str>>) -> Query {
     Query {
-        sql,
+        sql: sql.into(),
         values: Vec::new(),
     }
 }
 
 /// Returns a statement whose rows have one column, without parameters.
-pub(super) fn query_scalar(sql: &'static str) -> ScalarQuery {
+pub(super) fn query_scalar(sql: impl Into<Cow<'static, str>>) -> ScalarQuery {
     ScalarQuery(query(sql))
 }
 
@@ -95,10 +95,12 @@ macro_rules! run {
                 $run
             }
             On::PostgresPool($at) => {
+                let sql = AssertSqlSafe(sql.into_owned());
                 let $statement = $prepare(sql, arguments::<Postgres>(values)?);
                 $run
             }
             On::Postgres($at) => {
+                let sql = AssertSqlSafe(sql.into_owned());
                 let $statement = $prepare(sql, arguments::<Postgres>(values)?);
                 $run
             }
@@ -185,15 +187,12 @@ impl ScalarQuery {
     }
 }
 
-fn without_row_locks(sql: &'static str) -> String {
-    let without = |sql: Cow<'static, str>, clause: &&str| match sql.contains(*clause) {
-        true => Cow::Owned(sql.replace(*clause, "")),
-        false => sql,
-    };
-    ROW_LOCKS
-        .iter()
-        .fold(Cow::Borrowed(sql), without)
-        .into_owned()
+fn without_row_locks(sql: Cow<'static, str>) -> String {
+    let mut sql = sql.into_owned();
+    for clause in ROW_LOCKS {
+        sql = sql.replace(clause, "");
+    }
+    sql
 }
 
 #[cfg(test)]
@@ -234,8 +233,8 @@ mod tests {
     }
 
     #[test]
-    fn the_one_writer_needs_no_row_locks() {
-        let of = without_row_locks;
+    fn row_locks_are_removed_for_sqlite() {
+        let of = |sql: &'static str| without_row_locks(sql.into());
         assert_eq!(of("select 1 from jobs for update"), "select 1 from jobs");
         assert_eq!(
             of("(select 1 from jobs j limit 1 for update of j skip locked) returning id"),

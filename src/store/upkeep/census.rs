@@ -2,6 +2,7 @@
 //! cover all owners, so only operators may see them.
 
 use crate::store::jobs::{JobState, Kind};
+use crate::store::resources::ResourceKind;
 use crate::store::{Error, Store, sql};
 
 /// Contents of the store at one time.
@@ -15,44 +16,28 @@ pub struct Census {
     pub stored_bytes: Vec<(&'static str, i64)>,
 }
 
-const STORED: [(&str, &str); 5] = [
-    (
-        "footage",
-        "select cast(coalesce(sum(size_bytes), 0) as bigint) from footage",
-    ),
-    (
-        "libraries",
-        "select cast(coalesce(sum(size_bytes), 0) as bigint) from libraries",
-    ),
-    (
-        "flocks",
-        "select cast(coalesce(sum(size_bytes), 0) as bigint) from flocks",
-    ),
-    (
-        "fish",
-        "select cast(coalesce(sum(size_bytes), 0) as bigint) from fish",
-    ),
-    (
-        "uploads",
-        "select cast(coalesce(sum(offset_bytes), 0) as bigint) from uploads where footage_id is null",
-    ),
-];
-
 impl Store {
     /// Counts all jobs and bytes.
     pub async fn census(&self) -> Result<Census, Error> {
         let sql = "select kind, state, count(*) from jobs group by kind, state";
         let rows: Vec<(String, String, i64)> = sql::query(sql).fetch_all(&self.reader).await?;
-        let jobs = rows.iter().map(|(kind, state, n_jobs)| {
-            Ok((Kind::from_name(kind)?, JobState::from_name(state)?, *n_jobs))
+        let jobs = rows.into_iter().map(|(kind, state, n_jobs)| {
+            Ok((Kind::try_from(kind)?, JobState::try_from(state)?, n_jobs))
         });
         let jobs = jobs.collect::<Result<_, Error>>()?;
         let sql = "select min(created_ms) from jobs where state = 'queued'";
         let oldest_queued_ms = sql::query_scalar(sql).fetch_one(&self.reader).await?;
-        let mut stored_bytes = Vec::with_capacity(STORED.len());
-        for (noun, sql) in STORED {
+        let sources = ResourceKind::ALL.map(|kind| (kind.plural(), "size_bytes", kind.plural()));
+        let uploads = (
+            "uploads",
+            "offset_bytes",
+            "uploads where footage_id is null",
+        );
+        let mut stored_bytes = Vec::new();
+        for (name, column, rows) in sources.into_iter().chain([uploads]) {
+            let sql = format!("select cast(coalesce(sum({column}), 0) as bigint) from {rows}");
             let n_bytes = sql::query_scalar(sql).fetch_one(&self.reader).await?;
-            stored_bytes.push((noun, n_bytes));
+            stored_bytes.push((name, n_bytes));
         }
         Ok(Census {
             jobs,

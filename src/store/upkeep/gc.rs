@@ -4,7 +4,7 @@
 use std::fs;
 use std::time::SystemTime;
 
-use crate::store::idempotency::KEPT_MS;
+use crate::store::idempotency::ANSWER_LIFETIME_MS;
 use crate::store::{Error, Store, sql};
 
 /// Amount of removable data.
@@ -26,8 +26,8 @@ impl Store {
     /// Counts the removable data. Changes nothing.
     pub async fn waste(&self, now: SystemTime, now_ms: i64) -> Result<Waste, Error> {
         let mut waste = Waste::default();
-        (waste.n_drafts, waste.n_bytes) = self.blobs.work().n_left()?;
-        for folder in self.old_strays(now).await? {
+        (waste.n_drafts, waste.n_bytes) = self.blobs.drafts().n_abandoned()?;
+        for folder in self.old_folders_without_row(now).await? {
             waste.n_folders += 1;
             waste.n_bytes += folder.n_bytes;
         }
@@ -46,7 +46,7 @@ impl Store {
             ),
             (
                 "select count(*) from idempotency where created_ms <= $1",
-                now_ms - KEPT_MS,
+                now_ms - ANSWER_LIFETIME_MS,
             ),
         ] {
             let count: i64 = sql::query_scalar(sql)
@@ -70,7 +70,7 @@ impl Store {
             ("delete from sessions where expires_ms <= $1", now_ms),
             (
                 "delete from idempotency where created_ms <= $1",
-                now_ms - KEPT_MS,
+                now_ms - ANSWER_LIFETIME_MS,
             ),
         ] {
             let delete = || async {
@@ -92,10 +92,10 @@ mod tests {
     use crate::store::{blobs, fresh};
 
     #[tokio::test]
-    async fn what_nobody_refers_to_is_counted_and_then_removed() {
+    async fn unreferenced_data_is_counted_and_removed() {
         let data = tempfile::tempdir().unwrap();
         let store = Store::open(data.path()).await.unwrap();
-        for folder in ["tmp/draft", "blobs/flocks/stray.1"] {
+        for folder in ["tmp/draft", "blobs/flocks/folder.1"] {
             fs::create_dir_all(data.path().join(folder)).unwrap();
             fs::write(data.path().join(folder).join("video"), b"12345").unwrap();
         }
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn what_a_row_names_is_kept_however_old() {
+    async fn old_folders_with_rows_are_kept() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let draft = store.blobs().draft("film").unwrap();
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn beside_a_service_its_drafts_are_left_alone() {
+    async fn drafts_of_a_running_service_are_kept() {
         let data = tempfile::tempdir().unwrap();
         let service = Store::open(data.path()).await.unwrap();
         let draft = service.blobs().draft("under way").unwrap();

@@ -24,10 +24,10 @@ impl Store {
     /// names. Returns their numbers.
     pub async fn sweep(&self, now: SystemTime) -> Result<Swept, Error> {
         let mut swept = Swept {
-            n_drafts: self.blobs.work().sweep()?,
+            n_drafts: self.blobs.drafts().sweep()?,
             n_folders: 0,
         };
-        for folder in self.old_strays(now).await? {
+        for folder in self.old_folders_without_row(now).await? {
             self.blobs.discard(&folder.name).await?;
             swept.n_folders += 1;
         }
@@ -42,21 +42,24 @@ impl Store {
     }
 
     /// Returns the stored folders without a row that are older than [`GRACE`].
-    pub(in crate::store) async fn old_strays(&self, now: SystemTime) -> Result<Vec<Folder>, Error> {
-        let mut strays = self.folders_without_row().await?;
+    pub(in crate::store) async fn old_folders_without_row(
+        &self,
+        now: SystemTime,
+    ) -> Result<Vec<Folder>, Error> {
+        let mut folders = self.folders_without_row().await?;
         let is_old = |age: Duration| age > GRACE;
-        strays.retain(|stray| now.duration_since(stray.modified).is_ok_and(is_old));
-        Ok(strays)
+        folders.retain(|folder| now.duration_since(folder.modified).is_ok_and(is_old));
+        Ok(folders)
     }
 
     /// Returns the stored folders that no row names.
     pub(in crate::store) async fn folders_without_row(&self) -> Result<Vec<Folder>, Error> {
-        let mut strays = Vec::new();
+        let mut folders = Vec::new();
         for folder in self.blobs.folders().await? {
             if !self.is_folder_known(&folder.name).await? {
-                strays.push(folder);
+                folders.push(folder);
             }
         }
-        Ok(strays)
+        Ok(folders)
     }
 }

@@ -4,7 +4,7 @@ use flockreel::jobs::worker::{Step, Worker};
 use flockreel::jobs::{Attempt, Error, Product};
 use flockreel::progress::Progress;
 use flockreel::store::jobs::Lease;
-use flockreel::store::jobs::finish::Made;
+use flockreel::store::jobs::finish::Source;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
@@ -18,11 +18,10 @@ fn pretend(lease: &Lease, attempt: &Attempt) -> Result<Product, Error> {
     let input: Value = serde_json::from_str(&lease.input)?;
     let id = |name: &str| serde_json::from_value(input[name].clone());
     Ok(Product {
-        made: match lease.kind.name() {
-            "analysis" => Made::Library(id("footage_id")?),
-            "flock" => Made::Flock(id("library_id")?),
-            _ => Made::Fish(id("library_id")?),
-        },
+        source: Source::Resource(match lease.kind.name() {
+            "analysis" => id("footage_id")?,
+            _ => id("library_id")?,
+        }),
         params: "{}".into(),
         summary: "{}".into(),
     })

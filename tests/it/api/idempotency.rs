@@ -3,7 +3,7 @@
 use flockreel::ids::FootageId;
 use flockreel::jobs::clock::now_ms;
 use flockreel::jobs::supervisor::recover;
-use flockreel::jobs::{allotted, analysis};
+use flockreel::jobs::{IdSequence, analysis};
 use flockreel::store::idempotency::{Begun, Scope};
 use flockreel::store::owners::{Account, Owner};
 use flockreel::store::tokens::{NewToken, Scope as TokenScope};
@@ -93,7 +93,7 @@ async fn while_the_first_request_runs_the_second_is_told_so() {
 async fn crashed_between(app: &TestApp, footage: &str) -> Value {
     let then_ms = now_ms() - 2 * 3600 * 1000;
     let begun = app.context.store.begin_key(&scope(), None, then_ms).await;
-    let Begun::Run(family) = begun.unwrap() else {
+    let Begun::Run(base_id) = begun.unwrap() else {
         panic!("nobody had this key");
     };
     let input = analysis::Input {
@@ -101,10 +101,8 @@ async fn crashed_between(app: &TestApp, footage: &str) -> Value {
         params: flockreel::analysis::Params::default(),
     };
     let account = Account::local();
-    let queued = allotted::under(
-        family,
-        analysis::enqueue(&app.context, &input, None, &account),
-    );
+    let mut ids = IdSequence::derived_from(base_id);
+    let queued = app.context.enqueue(&input, None, &account, &mut ids);
     let (job_id, library_id) = queued.await.unwrap();
     recover(&app.context).await.unwrap();
     json!({"job_id": job_id, "library_id": library_id, "footage_id": footage})

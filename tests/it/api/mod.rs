@@ -1,6 +1,5 @@
 //! The API, tested through the real router over TCP. Most files test one noun of the API.
 
-mod at_once;
 mod auth;
 mod contract;
 mod corpus;
@@ -15,7 +14,7 @@ mod limits;
 mod metrics;
 mod names;
 mod one_call;
-mod parameters;
+mod synchronous;
 mod uploads;
 mod wait;
 mod walls;

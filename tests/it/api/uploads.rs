@@ -6,7 +6,7 @@ use std::time::Duration;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flockreel::jobs::clock::now_ms;
-use flockreel::store::uploads::LIFE_MS;
+use flockreel::store::uploads::LIFETIME_MS;
 use reqwest::{Method, RequestBuilder, Response, StatusCode};
 use sha1::{Digest, Sha1};
 use tokio::io::AsyncWriteExt;
@@ -171,7 +171,7 @@ async fn an_upload_ends_when_it_is_given_up_refused_or_too_old() {
     let old = begin(&app, 10).await;
     assert!(!gone(&old).await);
     assert_eq!(app.n_uploads(), 1);
-    let later = now_ms() + LIFE_MS + 1000;
+    let later = now_ms() + LIFETIME_MS + 1000;
     assert_eq!(app.context.store.sweep_uploads(later).await.unwrap(), 1);
     assert!(gone(&given_up).await && gone(&refused).await && gone(&old).await);
     assert_eq!(app.n_uploads(), 0);

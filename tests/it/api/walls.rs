@@ -6,7 +6,7 @@ use flockreel::api::signed;
 use flockreel::jobs::Product;
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::store::jobs::Kind;
-use flockreel::store::jobs::finish::Made;
+use flockreel::store::jobs::finish::Source;
 use flockreel::store::tokens::Scope;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
@@ -103,15 +103,15 @@ async fn belongings(app: &TestApp) -> Vec<(&'static str, String)> {
     let worker = Worker::new(app.context.clone());
     for _ in 0..3 {
         let step = worker.step_by(move |lease, attempt| {
-            let (made, name, summary) = match lease.kind {
-                Kind::Analysis => (Made::Library(footage_id), "library.json", library_summary()),
-                Kind::Flock => (Made::Flock(library), "flock.json", flock_summary()),
-                Kind::Fish => (Made::Fish(library), "video.mp4", fish_summary()),
+            let (source_id, name, summary) = match lease.kind {
+                Kind::Analysis => (footage_id, "library.json", library_summary()),
+                Kind::Flock => (library, "flock.json", flock_summary()),
+                Kind::Fish => (library, "video.mp4", fish_summary()),
                 Kind::Sample => unreachable!("a request queues no sample"),
             };
             std::fs::write(attempt.folder().join(name), b"{}")?;
             Ok(Product {
-                made,
+                source: Source::Resource(source_id),
                 params: "{}".to_owned(),
                 summary: summary.to_string(),
             })

@@ -8,7 +8,7 @@ use flockreel::random::uniform;
 use flockreel::store::Store;
 use flockreel::store::jobs::JobState;
 use flockreel::store::jobs::read::JobRow;
-use flockreel::store::owners::Reach;
+use flockreel::store::owners::OwnerFilter;
 use futures_util::StreamExt;
 use futures_util::stream::once;
 use reqwest::StatusCode;
@@ -47,7 +47,7 @@ fn longest_orphan() -> Duration {
 async fn row_of(place: &Place, job: &Value) -> JobRow {
     let store = Store::open(place.storage()).await.unwrap();
     let id = job.as_str().unwrap().parse().unwrap();
-    store.job(id, &Reach::All).await.unwrap().unwrap()
+    store.job(id, &OwnerFilter::All).await.unwrap().unwrap()
 }
 
 async fn assert_sound(place: &Place) {

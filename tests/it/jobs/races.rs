@@ -8,9 +8,10 @@ use flockreel::ids::JobId;
 use flockreel::store::Store;
 use flockreel::store::footage::{Added, Footage, VIDEO};
 use flockreel::store::jobs::enqueue::NewJob;
-use flockreel::store::jobs::finish::{Made, Outcome};
+use flockreel::store::jobs::finish::{Outcome, Source};
 use flockreel::store::jobs::{Change, JobState, Kind};
-use flockreel::store::owners::{Account, Owner, Reach};
+use flockreel::store::owners::{Account, Owner, OwnerFilter};
+use flockreel::store::resources::Fish;
 use uuid::Uuid;
 
 use crate::common::Place;
@@ -32,14 +33,14 @@ fn job(kind: Kind) -> NewJob {
         result_id: Uuid::now_v7(),
         after_job: None,
         priority: 0,
-        room: i64::MAX,
+        max_queued: i64::MAX,
     }
 }
 
 /// Returns a result without files.
-fn outcome(made: Made, result: Uuid) -> Outcome {
+fn outcome(source: Uuid, result: Uuid) -> Outcome {
     Outcome {
-        made,
+        source: Source::Resource(source),
         folder: format!("{result}"),
         files: Vec::new(),
         params: "{}".into(),
@@ -73,7 +74,7 @@ async fn library(store: &Store) -> Uuid {
     store.enqueue(&job(Kind::Analysis), 0).await.unwrap();
     let lease = store.claim(Uuid::now_v7(), 0, LEASE_MS).await;
     let lease = lease.unwrap().unwrap();
-    let made = outcome(Made::Library(footage.id), lease.result_id);
+    let made = outcome(footage.id, lease.result_id);
     assert_eq!(store.finish(&lease, &made, 0).await.unwrap(), Change::Made);
     lease.result_id
 }
@@ -113,9 +114,12 @@ async fn processes_that_race_for_jobs_do_each_of_them_once() {
     );
     assert_eq!(n_done, jobs.len());
     for job in jobs {
-        let row = store.job(job, &Reach::All).await.unwrap().unwrap();
+        let row = store.job(job, &OwnerFilter::All).await.unwrap().unwrap();
         assert_eq!((row.state, row.attempt), (JobState::Done, 1));
-        let made = store.fish(row.result_id, &Reach::All).await.unwrap();
+        let made = store
+            .resource::<Fish>(row.result_id, &OwnerFilter::All)
+            .await
+            .unwrap();
         assert_eq!(made.unwrap().job_id, job.0);
     }
 }
@@ -144,7 +148,7 @@ async fn one_of_those_that_race() {
     let store = Store::open_beside(storage).await.unwrap();
     let mut n_done = 0;
     while let Some(lease) = store.claim(Uuid::now_v7(), 1, LEASE_MS).await.unwrap() {
-        let made = outcome(Made::Fish(library), lease.result_id);
+        let made = outcome(library, lease.result_id);
         assert_eq!(store.finish(&lease, &made, 1).await.unwrap(), Change::Made);
         n_done += 1;
     }

@@ -2,7 +2,7 @@
 
 use flockreel::ids::{FootageId, JobId};
 use flockreel::jobs::worker::{Step, Worker};
-use flockreel::jobs::{Job, sample};
+use flockreel::jobs::{IdSequence, analysis, run, sample};
 use flockreel::progress::Progress;
 use flockreel::store::owners::Account;
 use reqwest::StatusCode;
@@ -14,8 +14,9 @@ use crate::common::app::code_of;
 /// Queues a sample of 20 frames. Returns the ids of its job and its footage.
 async fn queued(app: &TestApp) -> (JobId, FootageId) {
     let (input, account) = (sample::Input { n_frames: 20 }, Account::local());
-    let queued = sample::enqueue(&app.context, &input, &account).await;
-    queued.unwrap()
+    let mut ids = IdSequence::random();
+    let queued = app.context.enqueue(&input, None, &account, &mut ids);
+    queued.await.unwrap()
 }
 
 /// Returns kind, state and subject of every job, oldest first.
@@ -71,7 +72,7 @@ async fn a_sample_that_is_filmed_twice_is_one_footage() {
     );
     let (store, runtime) = (app.context.store.clone(), tokio::runtime::Handle::current());
     let lost = stale.step_by(move |lease, attempt| {
-        let product = Job::decode(lease)?.run(attempt)?;
+        let product = run(lease, attempt)?;
         assert_eq!(attempt.listener.position().stage, "filming");
         assert_eq!(attempt.listener.position().progress, 1.0);
         assert!(!attempt.listener.cancelled());
@@ -115,12 +116,12 @@ async fn a_sample_that_is_stored_already_fails_with_that_reason() {
 async fn a_deleted_sample_takes_its_job_and_the_jobs_after_it_along() {
     let app = TestApp::idle().await;
     let (job, footage_id) = queued(&app).await;
-    let measure = flockreel::jobs::analysis::Input {
+    let measure = analysis::Input {
         footage_id,
         params: Default::default(),
     };
-    let account = Account::local();
-    let after = flockreel::jobs::analysis::enqueue(&app.context, &measure, Some(job), &account);
+    let (account, mut ids) = (Account::local(), IdSequence::random());
+    let after = app.context.enqueue(&measure, Some(job), &account, &mut ids);
     after.await.unwrap();
     let step = Worker::new(app.context.clone()).step().await;
     assert_eq!(step.unwrap(), Step::Done(job));

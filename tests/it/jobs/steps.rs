@@ -11,8 +11,8 @@ use flockreel::jobs::{Attempt, Error, Product};
 use flockreel::progress::Progress;
 use flockreel::store::jobs::JobState;
 use flockreel::store::jobs::cancel::Cancel;
-use flockreel::store::jobs::finish::Made;
-use flockreel::store::owners::Reach;
+use flockreel::store::jobs::finish::Source;
+use flockreel::store::owners::OwnerFilter;
 use serde_json::json;
 
 use crate::common::TestApp;
@@ -31,7 +31,7 @@ async fn with_job() -> (TestApp, JobId, uuid::Uuid) {
 fn product(attempt: &Attempt, footage: uuid::Uuid) -> Result<Product, Error> {
     std::fs::write(attempt.folder().join("library.json"), b"{}")?;
     Ok(Product {
-        made: Made::Library(footage),
+        source: Source::Resource(footage),
         params: "{}".into(),
         summary: "{}".into(),
     })
@@ -98,7 +98,7 @@ async fn a_running_job_lets_go_when_it_is_cancelled() {
     let cancel = async {
         is_claimed.await.unwrap();
         assert_eq!(
-            store.cancel(job, &Reach::All, 0).await.unwrap(),
+            store.cancel(job, &OwnerFilter::All, 0).await.unwrap(),
             Cancel::Requested
         );
     };
@@ -124,7 +124,7 @@ async fn a_job_under_way_goes_back_unused_when_the_service_stops() {
     let row = app
         .context
         .store
-        .job(job, &Reach::All)
+        .job(job, &OwnerFilter::All)
         .await
         .unwrap()
         .unwrap();
@@ -167,7 +167,7 @@ async fn a_job_that_takes_too_long_is_told_to_stop_and_fails() {
 async fn a_job_that_would_fill_the_disk_is_stopped_before_it_does() {
     let (app, job, _) = with_job().await;
     let mut context = app.context.clone();
-    context.least_room_bytes = u64::MAX;
+    context.min_free_bytes = u64::MAX;
     let step = Worker::new(context)
         .step_by(|_, attempt| wait_until_cancelled(attempt))
         .await;
@@ -207,7 +207,7 @@ async fn what_may_pass_is_tried_again_three_times_at_most() {
     let row = app
         .context
         .store
-        .job(job, &Reach::All)
+        .job(job, &OwnerFilter::All)
         .await
         .unwrap()
         .unwrap();

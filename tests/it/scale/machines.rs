@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant, SystemTime};
 
 use flockreel::jobs::Context;
-use flockreel::jobs::admit::{Arrival, admit};
+use flockreel::jobs::admit::{ReceivedFiles, admit};
 use flockreel::jobs::clock::now_ms;
 use flockreel::store::Store;
 use flockreel::store::footage::{Added, VIDEO};
@@ -26,7 +26,7 @@ pub(super) async fn admitted(store: &Store) -> Uuid {
     let draft = store.blobs().draft("film").unwrap();
     std::fs::write(draft.path().join(VIDEO), &*SWIM).unwrap();
     let video = store.blobs().seal(&draft).unwrap().remove(0);
-    let arrival = Arrival {
+    let received = ReceivedFiles {
         draft,
         video,
         background: None,
@@ -35,7 +35,7 @@ pub(super) async fn admitted(store: &Store) -> Uuid {
         owner: Owner::local(),
     };
     let context = Context::new(store.clone(), 1);
-    let (Added::New(footage) | Added::Known(footage)) = admit(&context, arrival).await.unwrap();
+    let (Added::New(footage) | Added::Known(footage)) = admit(&context, received).await.unwrap();
     footage.id
 }
 

@@ -6,10 +6,11 @@ use std::time::{Duration, Instant};
 use flockreel::analysis::Params;
 use flockreel::ids::FootageId;
 use flockreel::jobs::clock::now_ms;
-use flockreel::jobs::{Context, analysis};
+use flockreel::jobs::{Context, IdSequence, analysis};
 use flockreel::store::Store;
 use flockreel::store::jobs::JobState;
-use flockreel::store::owners::{Account, Reach};
+use flockreel::store::owners::{Account, OwnerFilter};
+use flockreel::store::resources::Library;
 use rustix::process::Signal;
 
 use super::machines::admitted;
@@ -35,23 +36,26 @@ async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
         footage_id,
         params: Params::default(),
     };
-    let account = Account::local();
-    let (job, library) = analysis::enqueue(&context, &input, None, &account)
-        .await
-        .unwrap();
+    let (account, mut ids) = (Account::local(), IdSequence::random());
+    let queued = context.enqueue(&input, None, &account, &mut ids);
+    let (job, library) = queued.await.unwrap();
+    let stored = async || {
+        let row = store.resource::<Library>(library.0, &OwnerFilter::All);
+        row.await.unwrap()
+    };
 
     let elsewhere = place.second_machine();
     let stalled = WorkerProcess::start(&elsewhere);
     wait_until("it claims", async || stalled.has_logged("job claimed")).await;
     stalled.signal(Signal::STOP);
-    let fresh = WorkerProcess::start(&place.second_machine());
-    let row = async || store.job(job, &Reach::All).await.unwrap().unwrap();
+    let fresh = WorkerProcess::start(&place.elsewhere());
+    let row = async || store.job(job, &OwnerFilter::All).await.unwrap().unwrap();
     wait_until("another finishes", async || {
         row().await.state == JobState::Done
     })
     .await;
     let finished = row().await;
-    let kept = store.library(library.0, &Reach::All).await.unwrap();
+    let kept = stored().await;
 
     stalled.signal(Signal::CONT);
     let lets_go = async || {
@@ -68,7 +72,7 @@ async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
     assert_eq!(row().await, finished);
     let folder = &kept.as_ref().unwrap().folder;
     assert!(finished.attempt == 2 && folder.ends_with(".2"), "{folder}");
-    assert_eq!(store.library(library.0, &Reach::All).await.unwrap(), kept);
+    assert_eq!(stored().await, kept);
     assert_eq!(
         store.blobs().folders().await.unwrap().len(),
         2,

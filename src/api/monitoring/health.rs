@@ -69,12 +69,12 @@ pub(in crate::api) async fn readyz(
     let database = state.context.store.is_writable().await;
     let blobs = state.context.store.blobs().clone();
     let blob_store = blobs.is_writable().await;
-    let room = tokio::task::spawn_blocking(move || blobs.room_bytes().ok());
-    let room_bytes = room.await.ok().flatten();
+    let free_bytes = tokio::task::spawn_blocking(move || blobs.free_bytes().ok());
+    let room_bytes = free_bytes.await.ok().flatten();
     let disk = DiskView {
         room_bytes,
         reserve_bytes: state.config.disk_reserve_bytes,
-        ok: room_bytes.is_some_and(|room| room > state.config.disk_reserve_bytes),
+        ok: room_bytes.is_some_and(|free_bytes| free_bytes > state.config.disk_reserve_bytes),
     };
     let (media_tool, sandbox) = match &state.walls {
         Ok(walls) => (Some(walls.version.clone()), LayerView::all(walls)),
@@ -82,9 +82,10 @@ pub(in crate::api) async fn readyz(
     };
     let stops = state.context.draining.is_cancelled();
     let ready = database && blob_store && media_tool.is_some() && disk.ok && !stops;
-    let status = match ready {
-        true => StatusCode::OK,
-        false => StatusCode::SERVICE_UNAVAILABLE,
+    let status = if ready {
+        StatusCode::OK
+    } else {
+        StatusCode::SERVICE_UNAVAILABLE
     };
     let body = Readiness {
         ready,

@@ -6,54 +6,52 @@
 
 use std::ops::RangeInclusive;
 
-use axum::body::Body;
-use axum::extract::State;
-use axum::http::{Response, StatusCode};
+use axum::http::StatusCode;
 use axum::response::IntoResponse;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::AppState;
-use super::access::{Caller, signed};
-use super::download::find as find_file;
-use super::extract::{Id, Json};
-use super::flocks::{FILES, find};
-use super::problem::{Problem, ProblemBody};
-use super::timestamp::rfc3339;
+use super::FILES;
+use crate::api::access::signed;
+use crate::api::download::find as find_file;
+use crate::api::extract::{Access, Id, Json};
+use crate::api::problem::{Answer, Problem, ProblemBody};
+use crate::api::timestamp::rfc3339;
 use crate::code::Code;
 use crate::jobs::clock::now_ms;
+use crate::store::resources::Flock;
 
 /// Range of the lifetime of a link, seconds: a minute to a week. Free choice.
-const LINK_S: RangeInclusive<i64> = 60..=604_800;
+const LIFETIMES_S: RangeInclusive<i64> = 60..=604_800;
 
 /// File and lifetime of a link.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub(super) struct LinkRequest {
+pub(in crate::api) struct LinkRequest {
     /// Name of one of the flock's files.
-    #[serde(default = "video")]
+    #[serde(default = "default_file")]
     #[schema(default = "video.mp4")]
     file: String,
     /// Lifetime of the link, seconds, 60..=604800 (a week).
-    #[serde(default = "an_hour")]
+    #[serde(default = "default_lifetime_s")]
     #[schema(minimum = 60, maximum = 604_800, default = 3600)]
     expires_s: i64,
 }
 
 /// A signed link.
 #[derive(Debug, Serialize, ToSchema)]
-pub(super) struct LinkView {
+pub(in crate::api) struct LinkView {
     /// Path with signature, relative to this host.
     url: String,
     /// Time at which the link expires, RFC 3339 in UTC.
     expires_at: String,
 }
 
-fn video() -> String {
+fn default_file() -> String {
     "video.mp4".to_owned()
 }
 
-fn an_hour() -> i64 {
+fn default_lifetime_s() -> i64 {
     3600
 }
 
@@ -66,20 +64,19 @@ fn an_hour() -> i64 {
     (status = 201, body = LinkView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn create_flock_link(
-    State(state): State<AppState>,
-    caller: Caller,
+pub(in crate::api) async fn create_flock_link(
+    access: Access,
     Id(id): Id,
     Json(request): Json<LinkRequest>,
-) -> Result<Response<Body>, Problem> {
-    let flock = find(&state, &caller, id).await?;
+) -> Answer {
+    let flock = access.find::<Flock>(id).await?;
     let (name, _) = find_file(FILES, &request.file)?;
-    if !LINK_S.contains(&request.expires_s) {
+    if !LIFETIMES_S.contains(&request.expires_s) {
         let sentence = format!("expires_s must lie in 60..=604800: {}", request.expires_s);
         return Err(Problem::new(Code::InvalidParams, sentence));
     }
     let expires_s = now_ms() / 1000 + request.expires_s;
-    let key = state.context.store.signing_key().await?;
+    let key = access.store().signing_key().await?;
     let view = LinkView {
         url: signed(&key, &format!("/v1/flocks/{}/{name}", flock.id), expires_s),
         expires_at: rfc3339(expires_s * 1000),

@@ -25,7 +25,7 @@ use prometheus_client::registry::{Registry, Unit};
 
 use super::observe::Requests;
 use crate::api::AppState;
-use crate::api::access::{Caller, Names, guard};
+use crate::api::access::{Caller, HostNames, guard};
 use crate::api::problem::{Problem, ProblemBody};
 use crate::code::Code;
 use crate::jobs::Meters;
@@ -60,7 +60,7 @@ pub(in crate::api) struct Metrics {
 impl Metrics {
     /// Returns metrics that include the counters of jobs and requests.
     pub(in crate::api) fn new(meters: &Meters, requests: &Requests) -> Metrics {
-        let mut registry = counted(meters);
+        let mut registry = process_registry(meters);
         let (jobs, stored) = (Family::default(), Family::default());
         let oldest_queued = Gauge::default();
         registry.register("flockreel_jobs", "Jobs, by kind and state", jobs.clone());
@@ -87,7 +87,7 @@ impl Metrics {
     }
 
     /// Updates the metrics that describe the store.
-    fn note(&self, census: &Census, now_ms: i64) {
+    fn update(&self, census: &Census, now_ms: i64) {
         for (kind, state) in Kind::ALL
             .into_iter()
             .flat_map(|kind| JobState::ALL.map(|state| (kind, state)))
@@ -121,10 +121,10 @@ pub(in crate::api) async fn get_metrics(
     State(state): State<AppState>,
     caller: Caller,
 ) -> Result<Response<Body>, Problem> {
-    match caller.runs_the_service() {
-        true => text(&state).await,
-        false => Err(Code::ScopeTooSmall.into()),
+    if !caller.is_operator() {
+        return Err(Code::ScopeTooSmall.into());
     }
+    text(&state).await
 }
 
 /// Returns a router that serves only the metrics, without a token, for a separate listener.
@@ -134,19 +134,19 @@ pub fn metrics_router(state: AppState) -> Router {
         .route("/metrics", get(answer))
         .fallback(|| async { Problem::from(Code::NotFound) })
         .with_state(state)
-        .layer(middleware::from_fn_with_state(Names::Any, guard))
+        .layer(middleware::from_fn_with_state(HostNames::Any, guard))
 }
 
 /// Returns a router for the metrics of a process that only runs jobs. They cover this process; the queue and
 /// the store are reported once, by the service.
 pub fn worker_metrics_router(meters: &Meters) -> Router {
-    let registry = Arc::new(counted(meters));
-    let answer = async |State(registry): State<Arc<Registry>>| written(&registry);
+    let registry = Arc::new(process_registry(meters));
+    let answer = async |State(registry): State<Arc<Registry>>| encoded(&registry);
     Router::new()
         .route("/metrics", get(answer))
         .fallback(|| async { Problem::from(Code::NotFound) })
         .with_state(registry)
-        .layer(middleware::from_fn_with_state(Names::Any, guard))
+        .layer(middleware::from_fn_with_state(HostNames::Any, guard))
 }
 
 /// Collector for the number of dropped log lines, which is read at every request.
@@ -165,7 +165,7 @@ impl Collector for LostLines {
 }
 
 /// Returns a registry with the metrics of every process: version, dropped log lines, and jobs.
-fn counted(meters: &Meters) -> Registry {
+fn process_registry(meters: &Meters) -> Registry {
     let mut registry = Registry::default();
     let version = Info::new([("version", env!("CARGO_PKG_VERSION"))]);
     registry.register("flockreel_build", "Version of the running process", version);
@@ -176,11 +176,11 @@ fn counted(meters: &Meters) -> Registry {
 
 async fn text(state: &AppState) -> Result<Response<Body>, Problem> {
     let census = state.context.store.census().await?;
-    state.metrics.note(&census, now_ms());
-    written(&state.metrics.registry)
+    state.metrics.update(&census, now_ms());
+    encoded(&state.metrics.registry)
 }
 
-fn written(registry: &Registry) -> Result<Response<Body>, Problem> {
+fn encoded(registry: &Registry) -> Result<Response<Body>, Problem> {
     let mut text = String::new();
     encode(&mut text, registry).map_err(|error| {
         tracing::error!(%error, "the metrics could not be written");

@@ -13,25 +13,26 @@ use tokio::io::{AsyncReadExt, AsyncSeekExt};
 use tokio::task::spawn_blocking;
 use tokio_util::io::ReaderStream;
 
-use super::{Draft, Folder, KINDS, MARK};
+use super::{Draft, Folder, MARK};
 use crate::store::Error;
+use crate::store::resources::ResourceKind;
 
 /// Size of one read, bytes. Free choice.
-const PIECE_BYTES: usize = 1 << 20;
+const READ_BYTES: usize = 1 << 20;
 
 /// The folder, with one subfolder per kind.
 #[derive(Clone, Debug)]
-pub(super) struct Shelf {
+pub(super) struct LocalFolder {
     root: PathBuf,
 }
 
-impl Shelf {
-    pub(super) fn open(root: &Path) -> io::Result<Shelf> {
-        for kind in KINDS {
+impl LocalFolder {
+    pub(super) fn open(root: &Path) -> io::Result<LocalFolder> {
+        for kind in ResourceKind::ALL.map(ResourceKind::plural) {
             fs::create_dir_all(root.join(kind))?;
         }
         sync_folder(root)?;
-        Ok(Shelf {
+        Ok(LocalFolder {
             root: root.to_owned(),
         })
     }
@@ -68,9 +69,9 @@ impl Shelf {
         n_bytes: u64,
     ) -> Result<BoxStream<'static, io::Result<Bytes>>, Error> {
         let mut file = tokio::fs::File::open(self.folder(folder).join(name)).await?;
-        file.set_max_buf_size(PIECE_BYTES);
+        file.set_max_buf_size(READ_BYTES);
         file.seek(SeekFrom::Start(first)).await?;
-        Ok(ReaderStream::with_capacity(file.take(n_bytes), PIECE_BYTES).boxed())
+        Ok(ReaderStream::with_capacity(file.take(n_bytes), READ_BYTES).boxed())
     }
 
     /// Returns the mark of these files, if any (`identity`).
@@ -92,7 +93,7 @@ impl Shelf {
 
     pub(super) fn folders(&self) -> io::Result<Vec<Folder>> {
         let mut folders = Vec::new();
-        for kind in KINDS {
+        for kind in ResourceKind::ALL.map(ResourceKind::plural) {
             for entry in fs::read_dir(self.root.join(kind))? {
                 let entry = entry?;
                 // The folder may be deleted in the meantime.
@@ -151,19 +152,19 @@ mod tests {
     use std::time::{Duration, SystemTime};
 
     use super::*;
-    use crate::store::blobs::draft::Workplace;
+    use crate::store::blobs::draft::Drafts;
 
     #[tokio::test]
-    async fn what_was_long_in_the_making_is_young_when_it_is_put_in_place() {
+    async fn adopted_folder_counts_as_new() {
         let data = tempfile::tempdir().unwrap();
-        let work = Workplace::open(&data.path().join("tmp")).unwrap();
-        let shelf = Shelf::open(&data.path().join("blobs")).unwrap();
-        let draft = work.draft("x").unwrap();
+        let drafts = Drafts::open(&data.path().join("tmp")).unwrap();
+        let local = LocalFolder::open(&data.path().join("blobs")).unwrap();
+        let draft = drafts.draft("x").unwrap();
         let long_ago = SystemTime::UNIX_EPOCH + Duration::from_secs(1);
         let folder = File::open(draft.path()).unwrap();
         folder.set_modified(long_ago).unwrap();
-        shelf.adopt(draft, "flocks/x.1").await.unwrap();
-        let folder = shelf.folders().unwrap().remove(0);
+        local.adopt(draft, "flocks/x.1").await.unwrap();
+        let folder = local.folders().unwrap().remove(0);
         assert!(folder.modified > long_ago + Duration::from_secs(3600));
     }
 }

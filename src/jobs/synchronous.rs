@@ -15,20 +15,25 @@ use crate::flock::{Params, plan_flock};
 use crate::formats::library_dir::{self, StoredLibrary};
 use crate::formats::{flock_json, npy};
 use crate::progress::Progress;
-use crate::store::{Draft, Spill, libraries::Library};
+use crate::store::resources::Library;
+use crate::store::{Draft, Spill};
 
 /// Simulates and plans a flock. Returns its `flock.json`.
-pub async fn flock(context: &Context, library: &Library, params: Params) -> Result<Vec<u8>, Error> {
-    let plan = move |stored: StoredLibrary, _: &Draft, waiting: &Waiting| {
-        let flock = plan_flock(&stored.library, &params, waiting)?;
+pub async fn preview_flock(
+    context: &Context,
+    library: &Library,
+    params: Params,
+) -> Result<Vec<u8>, Error> {
+    let plan = move |stored: StoredLibrary, _: &Draft, cancellation: &Cancellation| {
+        let flock = plan_flock(&stored.library, &params, cancellation)?;
         Ok(flock_json::write(&flock))
     };
     compute(context, library, plan).await
 }
 
 /// Computes the distances between all clips of a library. Returns an unnamed file with the `distance.npy`.
-pub async fn distances(context: &Context, library: &Library) -> Result<File, Error> {
-    let write = |stored: StoredLibrary, draft: &Draft, waiting: &Waiting| {
+pub async fn distance_file(context: &Context, library: &Library) -> Result<File, Error> {
+    let write = |stored: StoredLibrary, draft: &Draft, cancellation: &Cancellation| {
         let library = stored.library;
         npy::check(library.sprites.n_frames())?;
         let planes = stored.params.planes;
@@ -40,7 +45,7 @@ pub async fn distances(context: &Context, library: &Library) -> Result<File, Err
             side: Side::Plain,
             cpu: Level::detect(),
         };
-        let matrix = DistanceMatrix::compute(&distances, waiting);
+        let matrix = DistanceMatrix::compute(&distances, cancellation);
         let Ok(matrix) = matrix else {
             return Err(Error::Cancelled);
         };
@@ -56,35 +61,35 @@ pub async fn distances(context: &Context, library: &Library) -> Result<File, Err
 }
 
 /// Runs a computation on a library. Waits for a permit; fails with [`Error::Busy`] if none becomes free.
-async fn compute<Made: Send + 'static>(
+async fn compute<Output: Send + 'static>(
     context: &Context,
     library: &Library,
-    work: impl FnOnce(StoredLibrary, &Draft, &Waiting) -> Result<Made, Error> + Send + 'static,
-) -> Result<Made, Error> {
-    let place = context.at_once.take().await?;
+    work: impl FnOnce(StoredLibrary, &Draft, &Cancellation) -> Result<Output, Error> + Send + 'static,
+) -> Result<Output, Error> {
+    let permit = context.synchronous_work.acquire().await?;
     let store = &context.store;
     let files = store.fetch(&library.folder, &library_dir::FILES).await?;
     let draft = store
         .blobs()
-        .draft(&format!("at-once.{}", Uuid::now_v7()))?;
-    let waiting = Waiting(CancellationToken::new());
-    let _gone = waiting.0.clone().drop_guard();
+        .draft(&format!("synchronous.{}", Uuid::now_v7()))?;
+    let cancellation = Cancellation(CancellationToken::new());
+    let _cancel_on_drop = cancellation.0.clone().drop_guard();
     let threads = context.threads;
-    let made = tokio::task::spawn_blocking(move || {
-        let _place = place;
+    let output = tokio::task::spawn_blocking(move || {
+        let _permit = permit;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.map_err(std::io::Error::other)?.install(|| {
             let stored = library_dir::read(files.path(), Arc::new(Spill::into(draft.path())))?;
-            work(stored, &draft, &waiting)
+            work(stored, &draft, &cancellation)
         })
     });
-    made.await.unwrap_or(Err(Error::Panicked))
+    output.await.unwrap_or(Err(Error::Panicked))
 }
 
-/// Progress of a computation during a request. It is cancelled when the request is dropped.
-struct Waiting(CancellationToken);
+/// Cancellation of a computation when its request is dropped. Progress is not reported.
+struct Cancellation(CancellationToken);
 
-impl Progress for Waiting {
+impl Progress for Cancellation {
     fn report(&self, _: &'static str, _: f64) {}
 
     fn cancelled(&self) -> bool {

@@ -8,7 +8,7 @@ use crate::jobs::Error;
 use crate::raster::Frame;
 
 /// A background video that is read along with the flock.
-pub(super) struct Behind<'a> {
+pub(super) struct BackgroundVideo<'a> {
     source: &'a dyn FrameSource,
     stream: Box<dyn FrameStream + 'a>,
     /// Frames of the video per frame of the flock.
@@ -18,10 +18,13 @@ pub(super) struct Behind<'a> {
     frame: Frame,
 }
 
-impl<'a> Behind<'a> {
+impl<'a> BackgroundVideo<'a> {
     /// Opens the video for a flock with `fps` frames per second.
-    pub(super) fn of(source: &'a dyn FrameSource, fps: f64) -> Result<Behind<'a>, Error> {
-        Ok(Behind {
+    pub(super) fn open(
+        source: &'a dyn FrameSource,
+        fps: f64,
+    ) -> Result<BackgroundVideo<'a>, Error> {
+        Ok(BackgroundVideo {
             source,
             stream: source.open()?,
             step: source.format().fps / fps,
@@ -31,7 +34,7 @@ impl<'a> Behind<'a> {
     }
 
     /// Sets the background of a shot. `frame_idx` must not decrease from call to call.
-    pub(super) fn at(&mut self, frame_idx: usize, shot: &mut Shot) -> Result<(), Error> {
+    pub(super) fn draw(&mut self, frame_idx: usize, shot: &mut Shot) -> Result<(), Error> {
         let wanted = (frame_idx as f64 * self.step) as usize;
         while self.n_read <= wanted {
             if self.stream.next_frame(&mut self.frame)?.is_none() {

@@ -14,30 +14,30 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep};
 
 /// Longest time during which a client may read nothing of a response. Free choice.
-const READER: Duration = Duration::from_secs(60);
+const MAX_WRITE_WAIT: Duration = Duration::from_secs(60);
 /// Total waiting time that every body may cause, in addition to what its length allows. Free choice.
 const GRACE: Duration = Duration::from_secs(30);
 /// Minimum average rate of a body, bytes per second. Any line that is used to send videos is faster.
-const LEAST_RATE: f64 = 1024.0;
+const MIN_BYTES_PER_S: f64 = 1024.0;
 
 /// A connection whose writes fail if the client reads nothing for too long.
-pub(super) struct Patient<S> {
+pub(super) struct WriteTimeout<S> {
     stream: S,
-    longest: Duration,
+    max_wait: Duration,
     waiting: Option<Pin<Box<Sleep>>>,
 }
 
-impl<S> Patient<S> {
-    pub(super) fn new(stream: S) -> Patient<S> {
-        Patient {
+impl<S> WriteTimeout<S> {
+    pub(super) fn new(stream: S) -> WriteTimeout<S> {
+        WriteTimeout {
             stream,
-            longest: READER,
+            max_wait: MAX_WRITE_WAIT,
             waiting: None,
         }
     }
 
     /// Passes on the result of a write. Fails with `TimedOut` if the write has been pending for too long.
-    fn watch(
+    fn limit_wait(
         &mut self,
         context: &mut Context<'_>,
         written: Poll<io::Result<usize>>,
@@ -46,21 +46,23 @@ impl<S> Patient<S> {
             self.waiting = None;
             return written;
         }
-        let longest = self.longest;
-        let waiting = self.waiting.get_or_insert_with(|| Box::pin(sleep(longest)));
+        let max_wait = self.max_wait;
+        let waiting = self
+            .waiting
+            .get_or_insert_with(|| Box::pin(sleep(max_wait)));
         ready!(waiting.as_mut().poll(context));
         Poll::Ready(Err(io::ErrorKind::TimedOut.into()))
     }
 }
 
-impl<S: AsyncWrite + Unpin> AsyncWrite for Patient<S> {
+impl<S: AsyncWrite + Unpin> AsyncWrite for WriteTimeout<S> {
     fn poll_write(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.stream).poll_write(context, bytes);
-        self.watch(context, written)
+        self.limit_wait(context, written)
     }
 
     fn poll_write_vectored(
@@ -69,7 +71,7 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Patient<S> {
         pieces: &[io::IoSlice<'_>],
     ) -> Poll<io::Result<usize>> {
         let written = Pin::new(&mut self.stream).poll_write_vectored(context, pieces);
-        self.watch(context, written)
+        self.limit_wait(context, written)
     }
 
     fn is_write_vectored(&self) -> bool {
@@ -85,7 +87,7 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Patient<S> {
     }
 }
 
-impl<S: AsyncRead + Unpin> AsyncRead for Patient<S> {
+impl<S: AsyncRead + Unpin> AsyncRead for WriteTimeout<S> {
     fn poll_read(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -113,7 +115,7 @@ pub(in crate::api) fn is_too_slow(error: &dyn std::error::Error) -> bool {
 }
 
 /// A body that fails with [`TooSlow`] if the total waiting time is too long for the number of bytes received.
-pub(super) struct Paced<B> {
+pub(super) struct MinRateBody<B> {
     body: B,
     grace: Duration,
     /// Total time spent waiting for the chunks received so far.
@@ -123,9 +125,9 @@ pub(super) struct Paced<B> {
     n_bytes: f64,
 }
 
-impl<B> Paced<B> {
-    pub(super) fn new(body: B) -> Paced<B> {
-        Paced {
+impl<B> MinRateBody<B> {
+    pub(super) fn new(body: B) -> MinRateBody<B> {
+        MinRateBody {
             body,
             grace: GRACE,
             waited: Duration::ZERO,
@@ -135,7 +137,7 @@ impl<B> Paced<B> {
     }
 }
 
-impl<B> Body for Paced<B>
+impl<B> Body for MinRateBody<B>
 where
     B: Body + Unpin,
     B::Error: Into<axum::BoxError>,
@@ -158,7 +160,7 @@ where
             this.n_bytes += data.map_or(0, Buf::remaining) as f64;
             return Poll::Ready(frame.map(|frame| frame.map_err(Into::into)));
         }
-        let allowed = this.grace + Duration::from_secs_f64(this.n_bytes / LEAST_RATE);
+        let allowed = this.grace + Duration::from_secs_f64(this.n_bytes / MIN_BYTES_PER_S);
         let left = allowed.saturating_sub(this.waited);
         let begin = || (Instant::now(), Box::pin(sleep(left)));
         let (_since, end) = this.waiting.get_or_insert_with(begin);
@@ -187,10 +189,10 @@ mod tests {
     const SOON: Duration = Duration::from_millis(100);
 
     #[tokio::test]
-    async fn who_takes_nothing_of_an_answer_is_left_and_who_takes_some_is_not() {
+    async fn write_times_out_only_if_the_client_reads_nothing() {
         let (ours, mut theirs) = duplex(16);
-        let mut ours = Patient::new(ours);
-        ours.longest = SOON;
+        let mut ours = WriteTimeout::new(ours);
+        ours.max_wait = SOON;
         let read = async {
             for _ in 0..8 {
                 tokio::time::sleep(SOON / 2).await;
@@ -205,18 +207,18 @@ mod tests {
     }
 
     /// Returns a body of 100 chunks of `n_bytes` bytes, one every tenth of [`SOON`].
-    fn dripping(n_bytes: usize) -> Paced<AnyBody> {
+    fn dripping(n_bytes: usize) -> MinRateBody<AnyBody> {
         let pieces = unfold(0, move |k| async move {
             tokio::time::sleep(SOON / 10).await;
             (k < 100).then(|| (Ok::<_, io::Error>(Bytes::from(vec![7; n_bytes])), k + 1))
         });
-        let mut paced = Paced::new(AnyBody::from_stream(pieces));
-        paced.grace = SOON;
-        paced
+        let mut body = MinRateBody::new(AnyBody::from_stream(pieces));
+        body.grace = SOON;
+        body
     }
 
     #[tokio::test]
-    async fn a_body_that_drips_is_cut_off_and_one_that_flows_is_not() {
+    async fn body_below_the_minimum_rate_is_cut_off() {
         let mut drips = AnyBody::new(dripping(1)).into_data_stream();
         let error = loop {
             if let Err(error) = drips.next().await.unwrap() {
@@ -231,13 +233,13 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn while_we_look_at_what_came_nobody_is_too_slow() {
+    async fn time_between_reads_of_the_server_does_not_count() {
         let body = AnyBody::from_stream(futures_util::stream::iter(
             [b"x"; 3].map(|piece| Ok::<_, io::Error>(Bytes::from_static(piece))),
         ));
-        let mut paced = Paced::new(body);
-        paced.grace = SOON / 10;
-        let mut pieces = AnyBody::new(paced).into_data_stream();
+        let mut body = MinRateBody::new(body);
+        body.grace = SOON / 10;
+        let mut pieces = AnyBody::new(body).into_data_stream();
         while let Some(piece) = pieces.next().await {
             piece.unwrap();
             tokio::time::sleep(SOON / 2).await;

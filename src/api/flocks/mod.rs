@@ -1,0 +1,220 @@
+//! Flocks: their JSON, and reading and deleting them with their files. The other files of this folder queue,
+//! preview and share flocks.
+
+pub(super) mod create; // JSON or a form -> queued job
+pub(super) mod links; // signed links to files
+pub(super) mod preview; // flock.json without a video
+
+use axum::http::StatusCode;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use utoipa::ToSchema;
+use uuid::Uuid;
+
+use super::analyses::AnalysisOverrides;
+use super::download::{Download, Files, disposition, find as find_file};
+use super::extract::{Access, Conditions, FileOf, Id};
+use super::paging::{Page, Paging};
+use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
+use super::resources::View;
+use super::timestamp::rfc3339;
+use crate::flock::Params;
+use crate::ids::{FlockId, JobId, LibraryId};
+use crate::jobs::flock::Summary;
+use crate::store::resources::{FilmRow, Flock};
+
+const FILES: Files = &[
+    ("flock.json", "application/json"),
+    ("frames.zip", "application/zip"),
+    ("ground-truth.zip", "application/zip"),
+    ("overlay.mp4", "video/mp4"),
+    ("plan.svg", "image/svg+xml"),
+    ("poster.png", "image/png"),
+    ("preview.gif", "image/gif"),
+    ("preview.webp", "image/webp"),
+    ("tracks.csv", "text/csv; charset=utf-8"),
+    ("video.mov", "video/quicktime"),
+    ("video.webm", "video/webm"),
+    ("video.mp4", "video/mp4"),
+];
+
+/// Library and parameters of a flock.
+///
+/// The parameters override the values of `preset`, or the defaults if there is no preset.
+#[derive(Debug, Deserialize, ToSchema)]
+pub(super) struct FlockRequest {
+    /// Library to make the flock from.
+    #[schema(value_type = Uuid)]
+    library_id: LibraryId,
+    #[serde(flatten)]
+    #[schema(value_type = Params)]
+    params: Map<String, Value>,
+}
+
+/// The queued job, and the flock that it makes.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct FlockAccepted {
+    /// Job that makes the flock.
+    #[schema(value_type = Uuid)]
+    job_id: JobId,
+    /// Flock that the job makes. It exists once the job is done.
+    #[schema(value_type = Uuid)]
+    flock_id: FlockId,
+    /// Library that the flock is made from. If it does not exist yet, the job waits for it.
+    #[schema(value_type = Uuid)]
+    library_id: LibraryId,
+}
+
+/// Form with a video to make a flock from.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the form in the OpenAPI document"
+)]
+pub(super) struct FlockForm {
+    /// Video, zip of numbered pictures, or TIFF of several pages.
+    #[schema(value_type = String, format = Binary)]
+    footage: Vec<u8>,
+    /// Picture of the scene without the animal, of the same width and height as the video.
+    #[schema(value_type = Option<String>, format = Binary)]
+    background: Option<Vec<u8>>,
+    /// Parameters of the flock to override, as JSON.
+    params: Option<FlockOverrides>,
+    /// Parameters of the analysis to override, as JSON.
+    analysis: Option<AnalysisOverrides>,
+}
+
+/// Parameters of a flock to override.
+///
+/// They override the values of `preset`, or the defaults if there is no preset.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the parameters in the OpenAPI document"
+)]
+pub(super) struct FlockOverrides {
+    preset: Option<String>,
+    #[serde(flatten)]
+    params: Params,
+}
+
+/// Summary of a flock.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct FlockView {
+    id: Uuid,
+    /// Job that made the flock.
+    job_id: Uuid,
+    /// Library that the flock was made from.
+    library_id: Uuid,
+    /// Whether it was made from the sample of an empty data folder.
+    sample: bool,
+    /// Size of all files, bytes.
+    size_bytes: i64,
+    /// Time of creation, RFC 3339 in UTC.
+    created_at: String,
+    /// All parameters of the flock, including defaults.
+    #[schema(value_type = Params)]
+    params: Value,
+    #[serde(flatten)]
+    summary: Summary,
+}
+
+/// List all flocks, newest first.
+#[utoipa::path(get, path = "/v1/flocks", params(Paging), responses(
+    (status = 200, body = Page<FlockView>),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn list_flocks(access: Access, paging: Paging) -> JsonAnswer<Page<FlockView>> {
+    access.list(paging).await
+}
+
+/// Get one flock: a summary, its parameters and advice.
+///
+/// Fails with `not_ready` if its job is not done. The message names the job and its state.
+#[utoipa::path(get, path = "/v1/flocks/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 200, body = FlockView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_flock(access: Access, Id(id): Id) -> JsonAnswer<FlockView> {
+    access.get(id).await
+}
+
+/// Delete a flock and its job.
+#[utoipa::path(delete, path = "/v1/flocks/{id}", params(("id" = Uuid, Path)), responses(
+    (status = 204, description = "deleted"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn delete_flock(access: Access, Id(id): Id) -> Result<StatusCode, Problem> {
+    access.delete::<Flock>(id).await
+}
+
+/// Download a file of a flock.
+///
+/// - `video.mp4`: the film
+/// - `flock.json`: all data of the flock
+/// - `plan.svg`: chart of the headings of boids and individuals
+/// - `tracks.csv`, `ground-truth.zip`: the ground truth, unless `render.ground_truth` is false
+/// - `video.webm`, `video.mov`, `frames.zip`, `preview.gif`, `preview.webp`, `poster.png`: if
+///   `render.formats` names them, by default only `poster.png`
+/// - `overlay.mp4`: the film with the position and heading of every boid, if `render.overlay` is true
+///
+/// Range and conditional requests are supported. A file that was not made fails with `not_found`.
+#[utoipa::path(get, path = "/v1/flocks/{id}/{file}",
+    params(("id" = Uuid, Path), ("file" = String, Path)), responses(
+    (status = 200, description = "the file"),
+    (status = 206, description = "the requested range of the file"),
+    (status = 304, description = "not modified"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_flock_file(
+    access: Access,
+    FileOf(id, name): FileOf,
+    conditions: Conditions,
+) -> Answer {
+    let (name, media_type) = find_file(FILES, &name)?;
+    let flock = access.find::<Flock>(id).await?;
+    // A browser cannot show these, so it saves them.
+    let kind = match media_type {
+        "application/zip" | "video/quicktime" => "attachment",
+        _ => "inline",
+    };
+    let download = Download {
+        folder: &flock.folder,
+        name,
+        media_type,
+        disposition: disposition(kind, &saved_name(name, id)),
+    };
+    download.answer(access.store(), &conditions).await
+}
+
+/// Returns the name under which a browser saves the file.
+fn saved_name(name: &str, id: Uuid) -> String {
+    match name {
+        "flock.json" => format!("flock-{id}.json"),
+        _ => match name.strip_prefix("video.") {
+            Some(kind) => format!("flock-{id}.{kind}"),
+            None => format!("flock-{id}-{name}"),
+        },
+    }
+}
+
+impl View for FlockView {
+    type Stored = Flock;
+
+    fn id(&self) -> Uuid {
+        self.id
+    }
+
+    fn from_row(row: FilmRow) -> Result<FlockView, Problem> {
+        Ok(FlockView {
+            id: row.id,
+            job_id: row.job_id,
+            library_id: row.library_id,
+            sample: row.sample,
+            size_bytes: row.size_bytes,
+            created_at: rfc3339(row.created_ms),
+            params: super::stored(&row.params)?,
+            summary: super::stored(&row.summary)?,
+        })
+    }
+}

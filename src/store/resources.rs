@@ -1,0 +1,169 @@
+//! Stored resources: footage and the results of jobs. Reading and listing their rows is the same for every
+//! kind; only the table and its columns differ.
+
+use sqlx::FromRow;
+use sqlx::postgres::PgRow;
+use sqlx::sqlite::SqliteRow;
+use sqlx::types::Uuid;
+
+use super::footage::Footage;
+use super::owners::OwnerFilter;
+use super::{Error, Store};
+
+/// Kinds of stored resources.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResourceKind {
+    /// An uploaded video, or the sample that a job made.
+    Footage,
+    /// The result of an analysis.
+    Library,
+    /// The result of a flock job.
+    Flock,
+    /// The result of a fish job.
+    Fish,
+}
+
+/// A kind of resource as a type, for queries that return its rows.
+pub trait Resource {
+    /// A row of the resource.
+    type Row: for<'r> FromRow<'r, SqliteRow> + for<'r> FromRow<'r, PgRow> + Send + Unpin;
+    /// The kind.
+    const KIND: ResourceKind;
+}
+
+impl Resource for Footage {
+    type Row = Footage;
+    const KIND: ResourceKind = ResourceKind::Footage;
+}
+
+/// One stored library. Its files are in `folder`.
+#[derive(Clone, Debug, PartialEq, FromRow)]
+pub struct Library {
+    /// Id of the library.
+    pub id: Uuid,
+    /// The job that made it.
+    pub job_id: Uuid,
+    /// The footage that was analyzed.
+    pub footage_id: Uuid,
+    /// Folder in the blob store.
+    pub folder: String,
+    /// Label of the footage.
+    pub name: String,
+    /// Parameters of the analysis, JSON.
+    pub params: String,
+    /// Summary for overviews, JSON.
+    pub summary: String,
+    /// Whether the footage is the sample made by the program.
+    pub sample: bool,
+    /// Total size of the files, bytes.
+    pub size_bytes: i64,
+    /// Time at which the analysis finished, milliseconds since 1970.
+    pub created_ms: i64,
+}
+
+impl Resource for Library {
+    type Row = Library;
+    const KIND: ResourceKind = ResourceKind::Library;
+}
+
+/// Flocks. Their rows are [`FilmRow`]s.
+pub struct Flock;
+
+impl Resource for Flock {
+    type Row = FilmRow;
+    const KIND: ResourceKind = ResourceKind::Flock;
+}
+
+/// Virtual fish. Their rows are [`FilmRow`]s.
+pub struct Fish;
+
+impl Resource for Fish {
+    type Row = FilmRow;
+    const KIND: ResourceKind = ResourceKind::Fish;
+}
+
+/// One stored flock or virtual fish. Its files are in `folder`.
+#[derive(Clone, Debug, PartialEq, FromRow)]
+pub struct FilmRow {
+    /// Id of the flock or fish.
+    pub id: Uuid,
+    /// The job that made it.
+    pub job_id: Uuid,
+    /// The library that it was made from.
+    pub library_id: Uuid,
+    /// Folder in the blob store.
+    pub folder: String,
+    /// Parameters of the job, JSON.
+    pub params: String,
+    /// Summary for overviews, JSON.
+    pub summary: String,
+    /// Whether it derives from the sample made by the program.
+    pub sample: bool,
+    /// Total size of the files, bytes.
+    pub size_bytes: i64,
+    /// Time at which the job finished, milliseconds since 1970.
+    pub created_ms: i64,
+}
+
+impl ResourceKind {
+    /// All kinds.
+    pub const ALL: [ResourceKind; 4] = [
+        ResourceKind::Footage,
+        ResourceKind::Library,
+        ResourceKind::Flock,
+        ResourceKind::Fish,
+    ];
+
+    /// Returns the name of the table, of the folder of the files, and of the routes.
+    pub fn plural(self) -> &'static str {
+        match self {
+            ResourceKind::Footage => "footage",
+            ResourceKind::Library => "libraries",
+            ResourceKind::Flock => "flocks",
+            ResourceKind::Fish => "fish",
+        }
+    }
+
+    /// Returns the statement that selects the rows of all owners. The table has the alias `r`.
+    fn select(self) -> String {
+        let table = self.plural();
+        match self {
+            ResourceKind::Footage => "select * from footage r".to_owned(),
+            ResourceKind::Library => {
+                "select r.id, r.job_id, footage_id, r.folder, params, summary, f.name, sample, \
+                 r.size_bytes, r.created_ms \
+                 from libraries r join footage f on f.id = footage_id"
+                    .to_owned()
+            }
+            ResourceKind::Flock | ResourceKind::Fish => format!(
+                "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
+                 r.size_bytes, r.created_ms \
+                 from {table} r join libraries l on l.id = library_id \
+                 join footage f on f.id = footage_id"
+            ),
+        }
+    }
+}
+
+impl Store {
+    /// Returns the resource if it exists and is visible to the caller.
+    pub async fn resource<R: Resource>(
+        &self,
+        id: Uuid,
+        owners: &OwnerFilter,
+    ) -> Result<Option<R::Row>, Error> {
+        self.visible_row(&R::KIND.select(), "id", id, owners).await
+    }
+
+    /// Returns the newest resources with ids less than `before`, at most `limit`.
+    pub async fn list_resources<R: Resource>(
+        &self,
+        limit: i64,
+        before: Option<Uuid>,
+        owners: &OwnerFilter,
+    ) -> Result<Vec<R::Row>, Error> {
+        let select = R::KIND.select();
+        self.newest_visible_rows(&select, limit, before, owners)
+            .await
+    }
+}
