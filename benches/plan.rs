@@ -145,17 +145,17 @@ fn synthetic_library(n_frames: u32) -> Library {
 }
 
 fn synthetic_jumps(n_frames: u32, heading: impl Fn(u32) -> f64) -> Vec<Jump> {
-    let frame = |draw: u64, which: u64| (unit(5, &[which, draw]) * f64::from(n_frames)) as u32;
+    let frame = |draw: u64, which: u64| (uniform(5, &[which, draw]) * f64::from(n_frames)) as u32;
     let jump = |draw: u64| {
         let (from, to) = (frame(draw, 1), frame(draw, 2));
-        let mirrored = unit(5, &[3, draw]) < 0.5;
+        let mirrored = uniform(5, &[3, draw]) < 0.5;
         let shown = if mirrored {
             std::f64::consts::PI - heading(to)
         } else {
             heading(to)
         };
         let alike = (heading(from) - shown).cos() > 0.97 && from.abs_diff(to) > 15;
-        let cost = 500 + (unit(5, &[4, draw]) * 499.0) as u64;
+        let cost = 500 + (uniform(5, &[4, draw]) * 499.0) as u64;
         alike.then_some(Jump {
             from,
             to,

@@ -145,8 +145,8 @@ fn the_rates_for_masks_make_them_match(films: &Films) {
                 ..ReadOptions::default()
             },
         );
-        let video = Video::open_with(&film, &limits, &hints).expect("a good film");
-        let masks = Masks::open(&video, &film, Some(&masks), &limits, &hints);
+        let video = Video::open_with(&film, &limits, &options).expect("a good film");
+        let masks = Masks::open(&video, &film, Some(&masks), &limits, &options);
         let masks = masks.expect("they can be read").expect("they are given");
         let masked = masks.over(&video).expect("of one size");
         read_all(&masked).map(|frames| frames.len())

@@ -34,7 +34,7 @@ fn pictures(films: &Films, is_opaque: bool) -> Vec<(String, Vec<u8>)> {
 fn masks_of(path: &Path) -> Option<(Video, Masks)> {
     let (limits, options) = (Limits::default(), ReadOptions::default());
     let video = Video::open(path, &limits).unwrap_or_else(|error| panic!("{path:?}: {error}"));
-    let masks = Masks::open(&video, path, None, &limits, &hints);
+    let masks = Masks::open(&video, path, None, &limits, &options);
     Some((video, masks.expect("they can be read")?))
 }
 

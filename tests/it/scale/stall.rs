@@ -48,7 +48,7 @@ async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
     let stalled = WorkerProcess::start(&elsewhere);
     wait_until("it claims", async || stalled.has_logged("job claimed")).await;
     stalled.signal(Signal::STOP);
-    let fresh = WorkerProcess::start(&place.elsewhere());
+    let fresh = WorkerProcess::start(&place.second_machine());
     let row = async || store.job(job, &OwnerFilter::All).await.unwrap().unwrap();
     wait_until("another finishes", async || {
         row().await.state == JobState::Done
