@@ -17,8 +17,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use flockreel::analysis::Params;
-use flockreel::analysis::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
 use flockreel::analysis::params::Planes;
+use flockreel::analysis::similarity::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
 use flockreel::cpu::Level;
 use flockreel::formats::npy;
 use flockreel::library::{Pose, Poses, Sprites};

@@ -14,27 +14,21 @@ pub mod subject;
 
 // Tracking and cutting out the animal.
 pub mod matte;
-pub mod moments;
 pub mod occluders;
 pub mod read_ahead;
 pub mod shadow;
-pub mod sprite;
 pub mod track;
 
-// The pose of the animal.
-pub mod direction;
-pub mod midline;
+// The pose of the animal, and similar moments.
 pub mod pose;
-
-// Similar moments.
-pub mod distance;
-pub mod playback;
+pub mod similarity;
 pub mod stats;
-pub mod transition;
 
 pub use error::{Error, Evidence};
 pub use params::Params;
 use params::{CutSprites, ScaleMode};
+use pose::{midline, sprite};
+use similarity::transition;
 
 use std::sync::Arc;
 

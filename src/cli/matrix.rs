@@ -6,7 +6,9 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Error, Listener, Summary};
-use crate::analysis::distance::{Cancelled, ComparedSprites, DistanceMatrix, Distances, Side};
+use crate::analysis::similarity::distance::{
+    Cancelled, ComparedSprites, DistanceMatrix, Distances, Side,
+};
 use crate::code::Code;
 use crate::cpu::Level;
 use crate::formats::distance_map::DistanceMap;

@@ -10,7 +10,7 @@
 //! shows the minimum of its pairs, so that a single similar pair stays visible.
 
 use super::picture;
-use crate::analysis::distance::{AllPairs, Cancelled, ClipPair, Distances};
+use crate::analysis::similarity::distance::{AllPairs, Cancelled, ClipPair, Distances};
 use crate::library::{Library, Sprites};
 use crate::progress::Progress;
 
@@ -181,8 +181,8 @@ mod tests {
     use std::sync::Arc;
 
     use crate::analysis::Params;
-    use crate::analysis::distance::{ComparedSprites, Side};
     use crate::analysis::params::Planes;
+    use crate::analysis::similarity::distance::{ComparedSprites, Side};
     use crate::cpu::Level;
     use crate::flock::synthetic;
     use crate::library::{Transition, View};

@@ -6,7 +6,7 @@
 
 use std::io::{self, Write};
 
-use crate::analysis::distance::DistanceMatrix;
+use crate::analysis::similarity::distance::DistanceMatrix;
 use crate::code::Code;
 
 /// Maximum number of frames. Longer footage is refused, because its matrix would exceed 256 MB.
@@ -76,7 +76,7 @@ fn header(kind: &str, n: usize) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::distance::tests::matrix_of_gray_levels;
+    use crate::analysis::similarity::distance::tests::matrix_of_gray_levels;
 
     #[test]
     fn numpys_own_bytes_come_out() {

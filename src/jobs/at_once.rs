@@ -9,7 +9,7 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{Context, Error};
-use crate::analysis::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
+use crate::analysis::similarity::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
 use crate::cpu::Level;
 use crate::flock::{Params, plan_flock};
 use crate::formats::library_dir::{self, StoredLibrary};

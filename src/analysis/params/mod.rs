@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 pub use hints::{AnimalAtParam, IgnoreParam};
 
-use super::distance::Clip;
+use super::similarity::distance::Clip;
 use crate::geometry::Camera;
 use crate::library::{Animal, View};
 

@@ -8,14 +8,17 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 mod appearance;
 mod depth;
+pub mod direction;
 mod heading;
+pub mod midline;
+pub mod moments;
 mod smooth;
+pub mod sprite;
 #[cfg(test)]
 mod synthetic;
 mod view;
 
 use super::Params;
-use super::direction::{self, Measurement};
 use super::params::AxisAndHead;
 use super::track::Tracked;
 use super::track::sighting::Sighting;
@@ -23,6 +26,7 @@ use crate::footage::FootageFormat;
 use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
 use appearance::HeadEvidence;
+use direction::Measurement;
 use heading::GivenHead;
 use smooth::smoothed_rates;
 

@@ -8,7 +8,7 @@ mod tests;
 pub use advice::{Advice, Motion, advice};
 
 use super::pose;
-use super::transition::Connections;
+use super::similarity::transition::Connections;
 use crate::geometry::wrap_rad;
 use crate::library::{LibraryStats, Pose, Poses};
 use crate::order::percentile;

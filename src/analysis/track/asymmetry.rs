@@ -4,7 +4,7 @@
 //! animal's mean. Subtracting the bin at the same distance from the other end leaves numbers that only change
 //! sign when the head changes ends. So all frames together can separate heads from tails (`pose::ends`).
 
-use super::super::moments::Moments;
+use super::super::pose::moments::Moments;
 use crate::geometry::Rect;
 use crate::raster::RgbaImage;
 

@@ -5,7 +5,7 @@
 use super::asymmetry::Asymmetry;
 use super::body;
 use crate::analysis::matte;
-use crate::analysis::moments::{self, Moments};
+use crate::analysis::pose::moments::{self, Moments};
 use crate::analysis::scene::light::Light;
 use crate::analysis::scene::plate::Plate;
 use crate::analysis::{silhouette, subject};

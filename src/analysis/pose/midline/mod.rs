@@ -14,8 +14,8 @@ mod walk;
 
 use rayon::prelude::*;
 
-use super::track::Track;
-use super::track::sighting::Sighting;
+use crate::analysis::track::Track;
+use crate::analysis::track::sighting::Sighting;
 use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
 use crate::order::median;

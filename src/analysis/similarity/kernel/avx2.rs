@@ -10,7 +10,7 @@ use std::arch::x86_64::*;
 use std::ops::Range;
 
 use super::{LANES, SadTile, Tile};
-use crate::analysis::distance::group::{BLOCK_BYTES, Block};
+use crate::analysis::similarity::group::{BLOCK_BYTES, Block};
 
 /// Largest number of rows against two columns. Their sums, two columns, one row and one difference fill the
 /// registers.

@@ -7,8 +7,6 @@
 //! matrix is never held.
 
 mod bounds;
-mod group;
-mod kernel;
 mod marks;
 mod matrix;
 mod minima;
@@ -30,10 +28,10 @@ pub use window::Clip;
 
 use rayon::prelude::*;
 
+use super::group::{GROUP, Group, GroupBuffer};
+use super::kernel::{self, Tile};
 use crate::cpu::Level;
 use crate::progress::Progress;
-use group::{GROUP, Group, GroupBuffer};
-use kernel::Tile;
 use window::WindowSums;
 
 /// Number of row groups in a panel. Each loaded column group serves this many tiles. Free choice.

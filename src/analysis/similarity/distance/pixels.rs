@@ -11,10 +11,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use super::super::group::{BlockGrid, GROUP, Group, GroupBuffer, SpilledGroup};
+use super::super::kernel::{Tile, Wanted, sad_tile};
 use super::Side;
 use super::bounds::{Bounds, SpriteSums};
-use super::group::{BlockGrid, GROUP, Group, GroupBuffer, SpilledGroup};
-use super::kernel::{Tile, Wanted, sad_tile};
 use super::rotation::Canvas;
 use crate::analysis::params::Planes;
 use crate::cpu::Level;

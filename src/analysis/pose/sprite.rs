@@ -4,8 +4,8 @@
 
 use std::sync::Arc;
 
-use super::track::sighting::Sighting;
-use super::track::{Track, Tracked};
+use crate::analysis::track::sighting::Sighting;
+use crate::analysis::track::{Track, Tracked};
 use crate::library::{Matte, Poses, Sprites, View};
 use crate::order::median;
 

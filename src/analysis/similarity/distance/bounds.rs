@@ -8,7 +8,7 @@
 //! that their differences fit signed 16-bit lanes. The bound then subtracts the largest possible rounding
 //! error.
 
-use super::kernel::{LANES, sad_u16};
+use super::super::kernel::{LANES, sad_u16};
 use crate::cpu::Level;
 
 /// Side of a fine square, pixels. Its sum is at most 64 * 255.

@@ -10,7 +10,7 @@
 use std::arch::x86_64::*;
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::group::{BLOCK_BYTES, Block};
+use crate::analysis::similarity::group::{BLOCK_BYTES, Block};
 
 /// Number of 64-byte loads per block.
 const STEPS: usize = BLOCK_BYTES / 64;

@@ -8,7 +8,7 @@ mod avx2;
 mod avx512;
 #[cfg(target_arch = "aarch64")]
 mod neon;
-pub(super) mod scalar;
+mod scalar;
 
 use std::ops::Range;
 

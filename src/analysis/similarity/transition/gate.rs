@@ -5,7 +5,7 @@
 use std::f64::consts::TAU;
 
 use crate::analysis::Params;
-use crate::analysis::distance::Marks;
+use crate::analysis::similarity::distance::Marks;
 use crate::geometry::angle::{mean_rad, mirrored_rad, wrap_rad};
 use crate::library::{Poses, View};
 

@@ -12,10 +12,11 @@ mod tests;
 
 use gate::Gate;
 
-use crate::analysis::distance::{
+use crate::analysis::similarity::distance::{
     Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Marks, PairFilter, Side,
 };
-use crate::analysis::{Error, Params, playback};
+use crate::analysis::similarity::playback;
+use crate::analysis::{Error, Params};
 use crate::cpu::Level;
 use crate::library::{Patch, Playback, Poses, Sprites, Transition};
 use crate::progress::Progress;

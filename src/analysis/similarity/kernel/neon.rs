@@ -7,7 +7,7 @@
 use std::arch::aarch64::*;
 
 use super::{SadTile, Tile};
-use crate::analysis::distance::group::{BLOCK_BYTES, Block};
+use crate::analysis::similarity::group::{BLOCK_BYTES, Block};
 
 /// Number of 16-byte loads per block.
 const STEPS: usize = BLOCK_BYTES / 16;

@@ -11,9 +11,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use super::super::group::{GROUP, Group, GroupBuffer};
+use super::super::kernel::{self, SadTile, Tile, Wanted};
 use super::bounds::SquareSums;
-use super::group::{GROUP, Group, GroupBuffer};
-use super::kernel::{self, SadTile, Tile, Wanted};
 use super::marks::Marks;
 use super::pair_filter::{self, PairFilter};
 use super::{Cancelled, ClipPair, Distances, Side};

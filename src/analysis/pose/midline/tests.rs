@@ -1,7 +1,7 @@
 //! Tests of the midline on synthetic tapered bodies with a known bend.
 
 use super::*;
-use crate::analysis::moments::moments;
+use crate::analysis::pose::moments::moments;
 use crate::analysis::track::Tracked;
 use crate::geometry::Rect;
 use crate::raster::RgbaImage;
