@@ -8,9 +8,11 @@
 
 use crate::analysis::Params;
 use crate::geometry::wrap_rad;
-use crate::library::{Library, Mover, Poses, View};
+use crate::library::{Library, Poses, View};
 
-mod sentence;
+mod kind;
+
+pub use kind::{Advice, Motion};
 
 /// Playback with less than this of one motion gives advice, seconds. Free choice.
 const MIN_MOTION_S: f64 = 0.5;
@@ -27,108 +29,6 @@ const MIN_VIEW_PROBABILITY: f64 = 0.9;
 const REST_BL_PER_S: f64 = 0.1;
 /// Half the time span over which speed and turning rate are measured, seconds. Free choice.
 const HALF_SPAN_S: f64 = 0.1;
-
-/// One deficiency of a library. The variants are in order of severity, the most severe first.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Advice {
-    /// The animal covers too few pixels, so there are no sprites.
-    AnimalTooSmall,
-    /// Several animals move. The largest was followed.
-    SeveralAnimals,
-    /// Other objects move.
-    OtherMovers {
-        /// Number of the objects.
-        n: usize,
-        /// The object that moves longest.
-        longest: Mover,
-    },
-    /// Some frames show another scene.
-    ForeignFrames {
-        /// Number of the frames.
-        n: usize,
-        /// Time of the first, seconds.
-        first_s: f64,
-    },
-    /// The view was guessed with a probability below 0.9.
-    ViewUnsure {
-        /// The guessed view.
-        view: View,
-        /// Its probability.
-        probability: f64,
-    },
-    /// Share of the frames in which the animal was found, below 0.8.
-    SeldomFound(f64),
-    /// Share of the frames with the animal in which it touches the border, above 0.2.
-    OftenAtBorder(f64),
-    /// Playback always ends, so no flock can be made.
-    NoTransitions,
-    /// Endless playback has less than half of the frames or less than 4 s.
-    LittlePlayback {
-        /// Share of the frames, 0..=1.
-        share: f64,
-        /// Duration, seconds.
-        duration_s: f64,
-    },
-    /// Number of frames from which playback can jump, below 20.
-    FewJumps(usize),
-    /// Multiple of the natural step that epsilon needed, above the requested `kappa`.
-    LooseJumps(f64),
-    /// Share of playable frames in which the animal moves, below 0.25.
-    MostlyRests(f64),
-    /// Playback shows a motion for less than 0.5 s.
-    Lacks {
-        /// The motion.
-        motion: Motion,
-        /// Its duration in playback, seconds.
-        playable_s: f64,
-        /// Its duration in the footage, seconds.
-        filmed_s: f64,
-    },
-}
-
-/// A motion that a flock should be able to show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Motion {
-    /// Side view: within 30 degrees of the right of the image.
-    Right,
-    /// Side view: within 30 degrees of the left of the image.
-    Left,
-    /// Side view with mirrored playback: right or left.
-    Level,
-    /// Side view: more than 30 degrees above the horizontal.
-    Up,
-    /// Side view: more than 30 degrees below the horizontal.
-    Down,
-    /// Top view: turns left by more than 45 degrees per second.
-    TurningLeft,
-    /// Top view: turns right by more than 45 degrees per second.
-    TurningRight,
-    /// Top view with mirrored playback: turns left or right.
-    Turning,
-    /// Top view: moves, and turns by at most 20 degrees per second.
-    Straight,
-}
-
-impl Advice {
-    /// Returns the stable code, for use by programs.
-    pub fn code(&self) -> &'static str {
-        match self {
-            Advice::AnimalTooSmall => "animal_too_small",
-            Advice::SeveralAnimals => "several_animals",
-            Advice::OtherMovers { .. } => "other_movers",
-            Advice::ForeignFrames { .. } => "foreign_frames",
-            Advice::ViewUnsure { .. } => "view_unsure",
-            Advice::SeldomFound(_) => "seldom_found",
-            Advice::OftenAtBorder(_) => "often_at_border",
-            Advice::NoTransitions => "no_transitions",
-            Advice::LittlePlayback { .. } => "little_playback",
-            Advice::FewJumps(_) => "few_jumps",
-            Advice::LooseJumps(_) => "loose_jumps",
-            Advice::MostlyRests(_) => "mostly_rests",
-            Advice::Lacks { motion, .. } => motion.names().0,
-        }
-    }
-}
 
 /// Returns the advice for a library, the most severe first; empty for a good library.
 pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
