@@ -13,8 +13,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use flockreel::analysis::Params;
 use flockreel::analysis::similarity::distance::{ComparedSprites, Distances, Side};
-use flockreel::analysis::{Params, transition};
+use flockreel::analysis::similarity::transition;
 use flockreel::cpu::Level;
 use flockreel::formats::library_dir;
 use flockreel::library::{Library, Pose, Poses, Sprites};
