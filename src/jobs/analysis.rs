@@ -7,7 +7,7 @@ use utoipa::ToSchema;
 
 use super::decoding::Counted;
 use super::masks::Masks;
-use super::{Attempt, Context, Error, Product, Stages, overlay, refusal};
+use super::{Attempt, Error, JobInput, Product, Stages, overlay, refusal};
 use crate::analysis::similarity::distance::{ComparedSprites, Distances, Side};
 use crate::analysis::{self, Params, analyze};
 use crate::footage::{FrameSource, Part};

@@ -6,6 +6,7 @@ use super::asymmetry::Asymmetry;
 use super::body;
 use crate::analysis::matte;
 use crate::analysis::pose::moments::{self, Moments};
+use crate::analysis::scene::background::Background;
 use crate::analysis::scene::light::Light;
 use crate::analysis::{silhouette, subject};
 use crate::geometry::Rect;
