@@ -192,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_name_leads_back_to_its_code() {
+    fn every_code_is_found_by_its_name() {
         for &code in Code::ALL {
             assert_eq!(Code::from_name(code.name()), Some(code));
         }

@@ -2,19 +2,15 @@
 //!
 //! The request names stored footage, or its body is the video itself, which is then stored first.
 
-use axum::body::Body;
-use axum::extract::{FromRequest, Query, Request, State};
-use axum::http::Response;
+use axum::extract::{FromRequest, Query, Request};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
-use super::AppState;
-use super::access::Caller;
-use super::extract::Json;
+use super::extract::{Access, Json};
 use super::footage::{Naming, admit};
 use super::jobs::accepted;
-use super::problem::{Problem, ProblemBody};
+use super::problem::{Answer, Problem, ProblemBody};
 use super::receive::{Form, is_film, receive_with_json};
 use crate::analysis::Params;
 use crate::code::Code;
@@ -101,43 +97,37 @@ pub(super) struct AnalysisForm {
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn create_analysis(
-    State(state): State<AppState>,
+    access: Access,
     Query(naming): Query<Naming>,
-    caller: Caller,
     mut ids: IdSequence,
     request: Request,
-) -> Result<Response<Body>, Problem> {
+) -> Answer {
     let input = if is_film(&request) {
         let form = Form {
             name: naming.name,
-            owner: caller.account.owner.clone(),
+            owner: access.caller.account.owner.clone(),
             json_fields: &["params"],
         };
-        let (received, mut fields) = receive_with_json(&state, request, form).await?;
+        let (received, mut fields) = receive_with_json(&access.state, request, form).await?;
         let params = params::read(fields.remove("params").unwrap_or_default())?;
-        let (Added::New(footage) | Added::Known(footage)) = admit(&state, received).await?;
+        let (Added::New(footage) | Added::Known(footage)) = admit(&access.state, received).await?;
         Input {
             footage_id: FootageId(footage.id),
             params,
         }
     } else {
-        let Json(request) = Json::<AnalysisRequest>::from_request(request, &state).await?;
+        let Json(request) = Json::<AnalysisRequest>::from_request(request, &access.state).await?;
         let params: Params = params::read(request.params)?;
         let footage_id = request.footage_id;
-        let footage = state
-            .context
-            .store
-            .resource::<Footage>(footage_id.0, &caller.owners);
+        let owners = &access.caller.owners;
+        let footage = access.store().resource::<Footage>(footage_id.0, owners);
         if footage.await?.is_none() {
             let sentence = format!("the footage does not exist: {footage_id}");
             return Err(Problem::new(Code::InvalidParams, sentence));
         }
         Input { footage_id, params }
     };
-    let queued = state
-        .context
-        .enqueue(&input, None, &caller.account, &mut ids);
-    let (job_id, library_id) = queued.await?;
+    let (job_id, library_id) = access.enqueue(&input, None, &mut ids).await?;
     let body = AnalysisAccepted {
         job_id,
         library_id,

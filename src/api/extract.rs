@@ -9,9 +9,50 @@ use axum::http::{HeaderMap, Method};
 use serde::de::DeserializeOwned;
 use uuid::Uuid;
 
-use super::Problem;
+use super::access::Caller;
+use super::{AppState, Problem};
 use crate::code::Code;
-use crate::jobs::IdSequence;
+use crate::ids::JobId;
+use crate::jobs::{IdSequence, JobInput};
+use crate::store::Store;
+
+/// The service, and the caller on whose behalf a handler uses it.
+pub(super) struct Access {
+    /// State of the service.
+    pub state: AppState,
+    /// Sender of the request.
+    pub caller: Caller,
+}
+
+impl Access {
+    /// Returns the store.
+    pub(super) fn store(&self) -> &Store {
+        &self.state.context.store
+    }
+
+    /// Queues a job for the caller. Returns the id of the job and the id that its result will have.
+    pub(super) async fn enqueue<Input: JobInput>(
+        &self,
+        input: &Input,
+        after_job: Option<JobId>,
+        ids: &mut IdSequence,
+    ) -> Result<(JobId, Input::ResultId), Problem> {
+        let account = &self.caller.account;
+        let queued = self.state.context.enqueue(input, after_job, account, ids);
+        Ok(queued.await?)
+    }
+}
+
+impl FromRequestParts<AppState> for Access {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Access, Problem> {
+        Ok(Access {
+            state: state.clone(),
+            caller: Caller::from_request_parts(parts, state).await?,
+        })
+    }
+}
 
 /// Id in the path. A malformed id fails with `not_found`.
 #[derive(Clone, Copy, Debug)]

@@ -1,22 +1,18 @@
 //! Virtual fish: start the job that makes one from the poses of a library, and read or delete it and its
 //! files.
 
-use axum::body::Body;
-use axum::extract::State;
-use axum::http::{Response, StatusCode};
+use axum::http::StatusCode;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::AppState;
-use super::access::Caller;
 use super::download::{Download, Files, disposition, find as find_file};
-use super::extract::{Conditions, FileOf, Id, Json};
+use super::extract::{Access, Conditions, FileOf, Id, Json};
 use super::jobs::{accepted, job_to_follow};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody};
-use super::resources::{View, delete, find, get, list};
+use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
+use super::resources::View;
 use super::timestamp::rfc3339;
 use crate::fish::Params;
 use crate::formats::params;
@@ -91,19 +87,15 @@ pub(super) struct FishView {
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn create_fish(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     mut ids: IdSequence,
     Json(request): Json<FishRequest>,
-) -> Result<Response<Body>, Problem> {
+) -> Answer {
     let params: Params = params::read(request.params)?;
     let library_id = request.library_id;
-    let after_job = job_to_follow(&state, &caller, library_id).await?;
+    let after_job = job_to_follow(&access, library_id).await?;
     let input = Input { library_id, params };
-    let queued = state
-        .context
-        .enqueue(&input, after_job, &caller.account, &mut ids);
-    let (job_id, fish_id) = queued.await?;
+    let (job_id, fish_id) = access.enqueue(&input, after_job, &mut ids).await?;
     let result = format!("/v1/fish/{fish_id}");
     Ok(accepted(job_id, &result, FishAccepted { job_id, fish_id }))
 }
@@ -113,12 +105,8 @@ pub(super) async fn create_fish(
     (status = 200, body = Page<FishView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn list_fish(
-    State(state): State<AppState>,
-    caller: Caller,
-    paging: Paging,
-) -> Result<axum::Json<Page<FishView>>, Problem> {
-    list(&state, &caller, paging).await
+pub(super) async fn list_fish(access: Access, paging: Paging) -> JsonAnswer<Page<FishView>> {
+    access.list(paging).await
 }
 
 /// Get one virtual fish: a summary and its parameters.
@@ -128,12 +116,8 @@ pub(super) async fn list_fish(
     (status = 200, body = FishView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn get_fish(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<axum::Json<FishView>, Problem> {
-    get(&state, &caller, id).await
+pub(super) async fn get_fish(access: Access, Id(id): Id) -> JsonAnswer<FishView> {
+    access.get(id).await
 }
 
 /// Delete a virtual fish and its job.
@@ -141,12 +125,8 @@ pub(super) async fn get_fish(
     (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn delete_fish(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<StatusCode, Problem> {
-    delete::<Fish>(&state, &caller, id).await
+pub(super) async fn delete_fish(access: Access, Id(id): Id) -> Result<StatusCode, Problem> {
+    access.delete::<Fish>(id).await
 }
 
 /// Download a file of a virtual fish.
@@ -163,13 +143,12 @@ pub(super) async fn delete_fish(
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_fish_file(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     FileOf(id, name): FileOf,
     conditions: Conditions,
-) -> Result<Response<Body>, Problem> {
+) -> Answer {
     let (name, media_type) = find_file(FILES, &name)?;
-    let fish = find::<Fish>(&state, &caller, id).await?;
+    let fish = access.find::<Fish>(id).await?;
     let extension = if name == "video.mp4" { "mp4" } else { "glb" };
     let label = format!("fish-{id}.{extension}");
     let download = Download {
@@ -178,7 +157,7 @@ pub(super) async fn get_fish_file(
         media_type,
         disposition: disposition("inline", &label),
     };
-    download.answer(&state.context.store, &conditions).await
+    download.answer(access.store(), &conditions).await
 }
 
 impl View for FishView {

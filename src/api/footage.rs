@@ -3,22 +3,20 @@
 //! A refused upload leaves no files. The original video is sent only as an attachment, so a browser never
 //! interprets it (docs/explanation/promises.md, "Nothing served runs as a page").
 
-use axum::body::Body;
-use axum::extract::{Query, Request, State};
-use axum::http::{Response, StatusCode, header};
+use axum::extract::{Query, Request};
+use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
 use super::AppState;
-use super::access::Caller;
 use super::download::{Download, disposition};
-use super::extract::{Conditions, Id};
+use super::extract::{Access, Conditions, Id};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody};
+use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::receive::receive;
-use super::resources::{View, delete, find, get, list};
+use super::resources::View;
 use super::timestamp::rfc3339;
 use crate::jobs::admit::ReceivedFiles;
 use crate::jobs::{Error, admit};
@@ -96,13 +94,18 @@ pub(super) struct FootageForm {
         (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
     ))]
 pub(super) async fn create_footage(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     Query(naming): Query<Naming>,
     request: Request,
-) -> Result<Response<Body>, Problem> {
-    let received = receive(&state, request, naming.name, caller.account.owner).await?;
-    let (status, footage) = match admit(&state, received).await? {
+) -> Answer {
+    let received = receive(
+        &access.state,
+        request,
+        naming.name,
+        access.caller.account.owner,
+    )
+    .await?;
+    let (status, footage) = match admit(&access.state, received).await? {
         Added::New(footage) => (StatusCode::CREATED, footage),
         Added::Known(footage) => (StatusCode::OK, footage),
     };
@@ -124,12 +127,8 @@ pub(super) async fn admit(state: &AppState, received: ReceivedFiles) -> Result<A
     (status = 200, body = Page<FootageView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn list_footage(
-    State(state): State<AppState>,
-    caller: Caller,
-    paging: Paging,
-) -> Result<axum::Json<Page<FootageView>>, Problem> {
-    list(&state, &caller, paging).await
+pub(super) async fn list_footage(access: Access, paging: Paging) -> JsonAnswer<Page<FootageView>> {
+    access.list(paging).await
 }
 
 /// Get one footage.
@@ -137,12 +136,8 @@ pub(super) async fn list_footage(
     (status = 200, body = FootageView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn get_footage(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<axum::Json<FootageView>, Problem> {
-    get(&state, &caller, id).await
+pub(super) async fn get_footage(access: Access, Id(id): Id) -> JsonAnswer<FootageView> {
+    access.get(id).await
 }
 
 /// Delete footage and everything made from it.
@@ -152,12 +147,8 @@ pub(super) async fn get_footage(
     (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn delete_footage(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<StatusCode, Problem> {
-    delete::<Footage>(&state, &caller, id).await
+pub(super) async fn delete_footage(access: Access, Id(id): Id) -> Result<StatusCode, Problem> {
+    access.delete::<Footage>(id).await
 }
 
 /// Download the uploaded video.
@@ -169,13 +160,8 @@ pub(super) async fn delete_footage(
     (status = 304, description = "not modified"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn get_footage_file(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-    conditions: Conditions,
-) -> Result<Response<Body>, Problem> {
-    let footage = find::<Footage>(&state, &caller, id).await?;
+pub(super) async fn get_footage_file(access: Access, Id(id): Id, conditions: Conditions) -> Answer {
+    let footage = access.find::<Footage>(id).await?;
     let label = match footage.name.as_str() {
         "" => "footage",
         name => name,
@@ -186,7 +172,7 @@ pub(super) async fn get_footage_file(
         media_type: "application/octet-stream",
         disposition: disposition("attachment", label),
     };
-    download.answer(&state.context.store, &conditions).await
+    download.answer(access.store(), &conditions).await
 }
 
 impl View for FootageView {

@@ -360,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn no_failure_of_ours_is_storable_and_nothing_that_passes() {
+    fn only_successes_and_permanent_client_errors_are_stored() {
         for status in [200, 201, 202, 400, 413, 422] {
             assert!(
                 is_storable(StatusCode::from_u16(status).unwrap()),

@@ -1,7 +1,6 @@
 //! Libraries: the results of analyses, with their pictures and files.
 
 use axum::body::Body;
-use axum::extract::State;
 use axum::http::{Response, StatusCode, header};
 use serde::Serialize;
 use serde_json::Value;
@@ -10,12 +9,11 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::AppState;
-use super::access::Caller;
 use super::download::{Download, Files, built, disposition, find as find_file};
-use super::extract::{Conditions, FileOf, Id};
+use super::extract::{Access, Conditions, FileOf, Id};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody};
-use super::resources::{View, delete, find, get, list};
+use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
+use super::resources::View;
 use super::timestamp::rfc3339;
 use crate::jobs::analysis::Summary;
 use crate::jobs::{self, synchronous};
@@ -70,11 +68,10 @@ pub(super) struct LibraryView {
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn list_libraries(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     paging: Paging,
-) -> Result<axum::Json<Page<LibraryView>>, Problem> {
-    list(&state, &caller, paging).await
+) -> JsonAnswer<Page<LibraryView>> {
+    access.list(paging).await
 }
 
 /// Get one library: a summary, its parameters and advice.
@@ -84,12 +81,8 @@ pub(super) async fn list_libraries(
     (status = 200, body = LibraryView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn get_library(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<axum::Json<LibraryView>, Problem> {
-    get(&state, &caller, id).await
+pub(super) async fn get_library(access: Access, Id(id): Id) -> JsonAnswer<LibraryView> {
+    access.get(id).await
 }
 
 /// Delete a library and everything made from it.
@@ -99,12 +92,8 @@ pub(super) async fn get_library(
     (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn delete_library(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<StatusCode, Problem> {
-    delete::<Library>(&state, &caller, id).await
+pub(super) async fn delete_library(access: Access, Id(id): Id) -> Result<StatusCode, Problem> {
+    access.delete::<Library>(id).await
 }
 
 /// Download a file of a library.
@@ -130,32 +119,27 @@ pub(super) async fn delete_library(
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_library_file(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     FileOf(id, name): FileOf,
     conditions: Conditions,
-) -> Result<Response<Body>, Problem> {
+) -> Answer {
     if name == DISTANCE_ARRAY {
-        let library = find::<Library>(&state, &caller, id).await?;
-        return distance_array(&state, &library, &conditions).await;
+        let library = access.find::<Library>(id).await?;
+        return distance_array(&access.state, &library, &conditions).await;
     }
     let (name, media_type) = find_file(FILES, &name)?;
-    let library = find::<Library>(&state, &caller, id).await?;
+    let library = access.find::<Library>(id).await?;
     let download = Download {
         folder: &library.folder,
         name,
         media_type,
         disposition: disposition("inline", name),
     };
-    download.answer(&state.context.store, &conditions).await
+    download.answer(access.store(), &conditions).await
 }
 
 /// Returns distance.npy. The library's files never change, so clients may cache the result forever.
-async fn distance_array(
-    state: &AppState,
-    library: &Library,
-    conditions: &Conditions,
-) -> Result<Response<Body>, Problem> {
+async fn distance_array(state: &AppState, library: &Library, conditions: &Conditions) -> Answer {
     let etag = format!("\"{}-{DISTANCE_ARRAY}\"", library.id);
     let known = conditions.headers.get(header::IF_NONE_MATCH);
     let answer = Response::builder().header(header::ETAG, &etag).header(

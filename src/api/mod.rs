@@ -49,6 +49,7 @@ use monitoring::metrics::Metrics;
 use monitoring::observe::{Requests, observe};
 use monitoring::{health, metrics};
 use page::{docs, openapi};
+use receive::CHUNK_TIMEOUT;
 
 use crate::code::Code;
 use crate::config::Config;
@@ -59,8 +60,6 @@ use crate::{media, store};
 
 /// Largest JSON body, bytes. Free choice.
 const MAX_JSON_BYTES: usize = 1 << 20;
-/// Longest wait for the next chunk of a body (docs/explanation/promises.md, "Slow clients"). Free choice.
-const CHUNK_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// State shared by all handlers. Every layer clones it for every request, so it is only a reference-counted
 /// pointer.

@@ -9,6 +9,12 @@ use crate::code::Code;
 use crate::formats::params;
 use crate::{jobs, store};
 
+/// Result of a handler.
+pub(super) type Answer = Result<Response, Problem>;
+
+/// Result of a handler that responds with JSON.
+pub(super) type JsonAnswer<T> = Result<axum::Json<T>, Problem>;
+
 /// Value of `Retry-After`, seconds. Free choice.
 const RETRY_AFTER_S: u64 = 5;
 

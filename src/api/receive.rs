@@ -25,7 +25,7 @@ use crate::store::intake::Intake;
 use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
 
-/// Longest wait for the next chunk of a body. Free choice.
+/// Longest wait for the next chunk of a body (docs/explanation/promises.md, "Slow clients"). Free choice.
 pub(super) const CHUNK_TIMEOUT: Duration = Duration::from_secs(30);
 /// Number of bytes after which the free space of the disk is checked again. Other requests fill the disk too,
 /// and a body need not declare its length. Free choice.
@@ -307,9 +307,8 @@ pub(super) fn label(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::label;
-
     #[test]
-    fn a_name_becomes_a_plain_label() {
+    fn label_has_no_folders_and_no_control_characters() {
         assert_eq!(label("../../etc/passwd"), "passwd");
         assert_eq!(label("C:\\films\\fish.mp4"), "fish.mp4");
         assert_eq!(label("a\r\nb\0\u{202e}4pm.exe"), "ab4pm.exe");

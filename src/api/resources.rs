@@ -4,11 +4,10 @@ use axum::http::StatusCode;
 use serde::Serialize;
 use uuid::Uuid;
 
-use super::AppState;
-use super::access::Caller;
+use super::extract::Access;
 use super::jobs::absent_result;
 use super::paging::{Page, Paging};
-use super::problem::Problem;
+use super::problem::{JsonAnswer, Problem};
 use crate::store::resources::Resource;
 
 /// The JSON form of a resource.
@@ -23,57 +22,41 @@ pub(super) trait View: Serialize + Sized {
     fn id(&self) -> Uuid;
 }
 
-/// Returns the row of a resource. Fails with `not_ready` if its job is not done, and with `not_found` if there
-/// is none.
-pub(super) async fn find<R: Resource>(
-    state: &AppState,
-    caller: &Caller,
-    id: Uuid,
-) -> Result<R::Row, Problem> {
-    let row = state.context.store.resource::<R>(id, &caller.owners);
-    match row.await? {
-        Some(row) => Ok(row),
-        None => Err(absent_result(state, caller, id).await?),
+impl Access {
+    /// Returns the row of a resource. Fails with `not_ready` if its job is not done, and with `not_found` if
+    /// there is none.
+    pub(super) async fn find<R: Resource>(&self, id: Uuid) -> Result<R::Row, Problem> {
+        let row = self.store().resource::<R>(id, &self.caller.owners);
+        match row.await? {
+            Some(row) => Ok(row),
+            None => Err(absent_result(self, id).await?),
+        }
     }
-}
 
-/// Returns a page of resources, newest first.
-pub(super) async fn list<V: View>(
-    state: &AppState,
-    caller: &Caller,
-    paging: Paging,
-) -> Result<axum::Json<Page<V>>, Problem> {
-    let store = &state.context.store;
-    let rows = store
-        .list_resources::<V::Stored>(paging.n_rows(), paging.cursor, &caller.owners)
-        .await?;
-    let views = rows
-        .into_iter()
-        .map(V::from_row)
-        .collect::<Result<_, _>>()?;
-    Ok(axum::Json(Page::new(views, paging, V::id)))
-}
+    /// Returns a page of resources, newest first.
+    pub(super) async fn list<V: View>(&self, paging: Paging) -> JsonAnswer<Page<V>> {
+        let (limit, owners) = (paging.n_rows(), &self.caller.owners);
+        let rows = self
+            .store()
+            .list_resources::<V::Stored>(limit, paging.cursor, owners);
+        let views = rows.await?.into_iter().map(V::from_row);
+        let views = views.collect::<Result<_, _>>()?;
+        Ok(axum::Json(Page::new(views, paging, V::id)))
+    }
 
-/// Returns one resource.
-pub(super) async fn get<V: View>(
-    state: &AppState,
-    caller: &Caller,
-    id: Uuid,
-) -> Result<axum::Json<V>, Problem> {
-    let row = find::<V::Stored>(state, caller, id).await?;
-    Ok(axum::Json(V::from_row(row)?))
-}
+    /// Returns one resource.
+    pub(super) async fn get<V: View>(&self, id: Uuid) -> JsonAnswer<V> {
+        let row = self.find::<V::Stored>(id).await?;
+        Ok(axum::Json(V::from_row(row)?))
+    }
 
-/// Deletes a resource and returns 204. Fails with `not_found` if it was deleted in the meantime.
-pub(super) async fn delete<R: Resource>(
-    state: &AppState,
-    caller: &Caller,
-    id: Uuid,
-) -> Result<StatusCode, Problem> {
-    find::<R>(state, caller, id).await?;
-    if state.context.store.delete(R::KIND, id).await? {
-        Ok(StatusCode::NO_CONTENT)
-    } else {
-        Err(Problem::not_found())
+    /// Deletes a resource and returns 204. Fails with `not_found` if it was deleted in the meantime.
+    pub(super) async fn delete<R: Resource>(&self, id: Uuid) -> Result<StatusCode, Problem> {
+        self.find::<R>(id).await?;
+        if self.store().delete(R::KIND, id).await? {
+            Ok(StatusCode::NO_CONTENT)
+        } else {
+            Err(Problem::not_found())
+        }
     }
 }

@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_calendar_is_the_common_one() {
+    fn timestamps_follow_the_gregorian_calendar() {
         for (ms, text) in [
             (0, "1970-01-01T00:00:00.000Z"),
             (951_782_400_000, "2000-02-29T00:00:00.000Z"),
@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn a_date_of_a_header_is_as_http_has_it() {
+    fn http_date_follows_rfc_9110() {
         assert_eq!(http_date(784_111_777_000), "Sun, 06 Nov 1994 08:49:37 GMT");
     }
 }

@@ -16,9 +16,8 @@ use tokio::time::timeout;
 use uuid::Uuid;
 
 use super::AppState;
-use super::access::Caller;
-use super::extract::Id;
-use super::problem::{Problem, ProblemBody};
+use super::extract::{Access, Id};
+use super::problem::{Answer, Problem, ProblemBody};
 use super::receive::{
     CHECK_EVERY_BYTES, CHUNK_TIMEOUT, check_free_space, code_of_broken_body, label,
 };
@@ -81,29 +80,24 @@ pub(super) async fn describe_uploads(State(state): State<AppState>) -> Response<
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn create_upload(
-    State(state): State<AppState>,
-    caller: Caller,
-    mut ids: IdSequence,
-    request: Request,
-) -> Result<Response<Body>, Problem> {
+pub(super) async fn create_upload(access: Access, mut ids: IdSequence, request: Request) -> Answer {
     let headers = request.headers();
     let size_bytes = number(headers, &LENGTH)?;
-    let limit_bytes = state.config.max_upload_bytes;
+    let limit_bytes = access.state.config.max_upload_bytes;
     if size_bytes.unsigned_abs() > limit_bytes {
         return Err(crate::store::Error::TooLarge { limit_bytes }.into());
     }
-    check_free_space(&state, size_bytes.unsigned_abs())?;
+    check_free_space(&access.state, size_bytes.unsigned_abs())?;
     let upload = Upload {
         id: ids.next_id(),
-        owner: caller.account.owner,
+        owner: access.caller.account.owner.clone(),
         name: label(&file_name(headers)?),
         size_bytes,
         offset_bytes: 0,
         footage_id: None,
         expires_ms: now_ms() + LIFETIME_MS,
     };
-    let store = &state.context.store;
+    let store = access.store();
     store.sweep_uploads(now_ms()).await?;
     let location = [(header::LOCATION, format!("/v1/uploads/{}", upload.id))];
     let lock = store.lock_upload(upload.id).await;
@@ -114,7 +108,7 @@ pub(super) async fn create_upload(
     }
     store.create_upload(&upload).await?;
     let upload = if is_chunk(headers) {
-        receive_chunk(&state, &lock, upload, request).await?
+        receive_chunk(&access.state, &lock, upload, request).await?
     } else {
         upload
     };
@@ -126,16 +120,12 @@ pub(super) async fn create_upload(
     (status = 200, headers(("upload-offset" = i64), ("upload-length" = i64), ("upload-expires" = String))),
     (status = "4XX", description = "an error; a response to HEAD has no body"),
 ))]
-pub(super) async fn head_upload(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<Response<Body>, Problem> {
-    find(&state, &caller.owners, id).await?;
-    let lock = state.context.store.lock_upload(id).await;
-    let upload = find(&state, &caller.owners, id).await?;
+pub(super) async fn head_upload(access: Access, Id(id): Id) -> Answer {
+    find(&access, id).await?;
+    let lock = access.store().lock_upload(id).await;
+    let upload = find(&access, id).await?;
     // The process may have ended after the last byte, before the upload became footage.
-    let upload = finish_if_complete(&state, upload).await?;
+    let upload = finish_if_complete(&access.state, upload).await?;
     drop(lock);
     Ok((StatusCode::OK, status_headers(&upload)).into_response())
 }
@@ -152,25 +142,20 @@ pub(super) async fn head_upload(
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn patch_upload(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-    request: Request,
-) -> Result<Response<Body>, Problem> {
+pub(super) async fn patch_upload(access: Access, Id(id): Id, request: Request) -> Answer {
     if !is_chunk(request.headers()) {
         let sentence = format!("the Content-Type of an upload part must be {CHUNK_MEDIA_TYPE}");
         return Err(Problem::new(Code::UnsupportedMediaType, sentence));
     }
     let offset_bytes = number(request.headers(), &OFFSET)?;
-    find(&state, &caller.owners, id).await?;
-    let lock = state.context.store.lock_upload(id).await;
-    let upload = find(&state, &caller.owners, id).await?;
+    find(&access, id).await?;
+    let lock = access.store().lock_upload(id).await;
+    let upload = find(&access, id).await?;
     if offset_bytes != upload.offset_bytes {
         let sentence = format!("the stored offset is {} bytes", upload.offset_bytes);
         return Err(Problem::new(Code::OffsetDiffers, sentence));
     }
-    let upload = receive_chunk(&state, &lock, upload, request).await?;
+    let upload = receive_chunk(&access.state, &lock, upload, request).await?;
     Ok((StatusCode::NO_CONTENT, status_headers(&upload)).into_response())
 }
 
@@ -179,20 +164,17 @@ pub(super) async fn patch_upload(
     (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn delete_upload(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<StatusCode, Problem> {
-    find(&state, &caller.owners, id).await?;
-    let _lock = state.context.store.lock_upload(id).await;
-    find(&state, &caller.owners, id).await?;
-    state.context.store.delete_upload(id).await?;
+pub(super) async fn delete_upload(access: Access, Id(id): Id) -> Result<StatusCode, Problem> {
+    find(&access, id).await?;
+    let _lock = access.store().lock_upload(id).await;
+    find(&access, id).await?;
+    access.store().delete_upload(id).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
-async fn find(state: &AppState, owners: &OwnerFilter, id: Uuid) -> Result<Upload, Problem> {
-    let upload = state.context.store.upload(id, owners, now_ms()).await?;
+async fn find(access: &Access, id: Uuid) -> Result<Upload, Problem> {
+    let owners = &access.caller.owners;
+    let upload = access.store().upload(id, owners, now_ms()).await?;
     upload.ok_or_else(Problem::not_found)
 }
 

@@ -167,7 +167,7 @@ fn show_refusal(film: &dyn FrameSource, error: &analysis::Error, output: &Path) 
         return;
     };
     let name = output.file_name().unwrap_or_default().to_string_lossy();
-    let path = output.with_file_name(format!("{name}.{}", refusal::NAME));
+    let path = output.with_file_name(format!("{name}.{}", refusal::FILE_NAME));
     let folder = output.parent().unwrap_or(Path::new(""));
     let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, picture));
     match written {

@@ -151,7 +151,7 @@ fn described(token: &Token) -> Value {
         "created_ms": token.created_ms,
         "expires_ms": token.expires_ms,
         "revoked_ms": token.revoked_ms,
-        "good": token.is_good(now_ms()),
+        "good": token.is_valid(now_ms()),
     })
 }
 

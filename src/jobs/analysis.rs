@@ -118,7 +118,7 @@ impl JobInput for Input {
         };
         let film = Counted::new(source, progress);
         let library = analyze(&film, background, &self.params, level, &scratch, progress)
-            .map_err(|cause| refusal::illustrated(source, cause))?;
+            .map_err(|cause| refusal::with_picture(source, cause))?;
         self.write(attempt, &library, &footage)?;
         overlay::film(
             &Part::of(source, self.params.from_s, self.params.to_s),
@@ -129,7 +129,7 @@ impl JobInput for Input {
         Ok(Product {
             source: Source::Resource(self.footage_id.0),
             params: serde_json::to_string(&self.params)?,
-            summary: serde_json::to_string(&Summary::of(&library, &self.params, video.notes()))?,
+            summary: serde_json::to_string(&Summary::new(&library, &self.params, video.notes()))?,
         })
     }
 }
@@ -170,7 +170,7 @@ impl Input {
 }
 
 impl Summary {
-    fn of(library: &Library, params: &Params, notes: &[Note]) -> Summary {
+    fn new(library: &Library, params: &Params, notes: &[Note]) -> Summary {
         let stats = &library.stats;
         Summary {
             fps: library.poses.fps,

@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn progress_runs_through_the_stages_and_never_falls() {
+    fn progress_follows_the_stages_and_never_decreases() {
         let listener = Listener::new(&[("background", 0.25), ("tracking", 0.75)]);
         let after = |stage, fraction| {
             listener.report(stage, fraction);
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_has_the_time_until_the_next_and_all_of_its_parts() {
+    fn stage_times_add_up_all_parts_of_a_stage() {
         let listener = Listener::new(&[("background", 0.25), ("tracking", 0.75)]);
         let pause = || std::thread::sleep(Duration::from_millis(20));
         for stage in ["background", "tracking", "background", "of no table"] {

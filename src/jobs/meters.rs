@@ -121,7 +121,7 @@ mod tests {
     use crate::progress::Progress;
 
     #[test]
-    fn an_attempt_is_counted_with_its_stages_and_frames() {
+    fn attempt_is_counted_with_its_stages_and_frames() {
         let (meters, mut registry) = (Meters::default(), Registry::default());
         meters.register(&mut registry);
         let listener = Listener::new(&[("tracking", 1.0)]);

@@ -8,10 +8,10 @@ use crate::formats::evidence;
 use crate::raster::Frame;
 
 /// File name of the picture, also in URLs.
-pub const NAME: &str = "refused.jpg";
+pub const FILE_NAME: &str = "refused.jpg";
 
 /// Returns the error of an analysis, with a picture if the footage shows the reason.
-pub fn illustrated(source: &dyn FrameSource, cause: analysis::Error) -> Error {
+pub fn with_picture(source: &dyn FrameSource, cause: analysis::Error) -> Error {
     match picture(source, &cause) {
         Some(picture) => Error::Refused { cause, picture },
         None => Error::Analysis(cause),

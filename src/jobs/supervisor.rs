@@ -14,9 +14,9 @@ use crate::ids::JobId;
 use crate::store::{self, Store, jobs::JobState};
 
 /// Interval at which idle workers look for jobs, even without a notification. Free choice.
-const POLL: Duration = Duration::from_secs(1);
+const POLL_INTERVAL: Duration = Duration::from_secs(1);
 /// Maximum wait for running jobs when the process stops. Free choice.
-const DRAIN: Duration = Duration::from_secs(15);
+const DRAIN_TIMEOUT: Duration = Duration::from_secs(15);
 
 /// The running workers of a process.
 pub struct Supervisor {
@@ -45,7 +45,7 @@ impl Supervisor {
     pub async fn drain(mut self) {
         self.context.draining.cancel();
         let all = async { while self.tasks.join_next().await.is_some() {} };
-        if timeout(DRAIN, all).await.is_err() {
+        if timeout(DRAIN_TIMEOUT, all).await.is_err() {
             tracing::warn!("a job did not stop within 15 s; it is rescued at the next start");
         }
     }
@@ -58,7 +58,7 @@ async fn work(context: Context) {
             Ok(Step::Idle) => {
                 tokio::select! {
                     () = context.wake.notified() => {}
-                    () = sleep(POLL) => {}
+                    () = sleep(POLL_INTERVAL) => {}
                     () = context.draining.cancelled() => {}
                 }
             }
@@ -66,7 +66,7 @@ async fn work(context: Context) {
             Ok(_) => context.wake.notify_one(),
             Err(error) => {
                 tracing::error!(%error, "the queue returned an error to a worker");
-                sleep(POLL).await;
+                sleep(POLL_INTERVAL).await;
             }
         }
     }
@@ -74,19 +74,19 @@ async fn work(context: Context) {
 
 async fn rescue(context: Context) {
     while !context.draining.is_cancelled() {
-        match rescue_silent(&context).await {
+        match rescue_expired(&context).await {
             Ok(rescued) if rescued.is_empty() => {}
             Ok(_) => context.wake.notify_one(),
             Err(error) => tracing::error!(%error, "the search for ended leases failed"),
         }
         tokio::select! {
-            () = sleep(POLL) => {}
+            () = sleep(POLL_INTERVAL) => {}
             () = context.draining.cancelled() => {}
         }
     }
 }
 
-async fn rescue_silent(context: &Context) -> Result<Vec<(JobId, JobState)>, store::Error> {
+async fn rescue_expired(context: &Context) -> Result<Vec<(JobId, JobState)>, store::Error> {
     context.store.rescue(context.now_ms().await?).await
 }
 
@@ -106,7 +106,7 @@ async fn listen(context: Context) {
         };
         let Err(error) = lost;
         tracing::warn!(%error, "notifications of new jobs are interrupted; workers poll the queue until they are back");
-        sleep(POLL).await;
+        sleep(POLL_INTERVAL).await;
     }
 }
 

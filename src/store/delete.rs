@@ -14,29 +14,28 @@ use super::{Error, Store, Transaction, sql};
 impl Store {
     /// Deletes a resource and everything made from it. Returns false if the resource does not exist.
     pub async fn delete(&self, kind: ResourceKind, id: Uuid) -> Result<bool, Error> {
-        self.reserve.lend(|| self.delete_now(kind, id)).await
-    }
-
-    async fn delete_now(&self, kind: ResourceKind, id: Uuid) -> Result<bool, Error> {
-        let mut transaction = self.writer.begin().await?;
-        let folders = match kind {
-            ResourceKind::Footage => delete_footage_rows(&mut transaction, id).await?,
-            ResourceKind::Library => delete_library_rows(&mut transaction, id).await?,
-            ResourceKind::Flock | ResourceKind::Fish => {
-                delete_film_rows(&mut transaction, id).await?
+        let delete = || async {
+            let mut transaction = self.writer.begin().await?;
+            let folders = match kind {
+                ResourceKind::Footage => delete_footage_rows(&mut transaction, id).await?,
+                ResourceKind::Library => delete_library_rows(&mut transaction, id).await?,
+                ResourceKind::Flock | ResourceKind::Fish => {
+                    delete_film_rows(&mut transaction, id).await?
+                }
+            };
+            for folder in &folders {
+                let delete = sql::query("delete from blobs where folder = $1").bind(folder);
+                delete.execute(&mut transaction).await?;
             }
+            transaction.commit().await?;
+            for folder in &folders {
+                self.blobs.discard(folder).await?;
+            }
+            let was_there = !folders.is_empty();
+            tracing::info!(resource.kind = kind.plural(), resource.id = %id, was_there, "resource deleted");
+            Ok(was_there)
         };
-        for folder in &folders {
-            let delete = sql::query("delete from blobs where folder = $1").bind(folder);
-            delete.execute(&mut transaction).await?;
-        }
-        transaction.commit().await?;
-        for folder in &folders {
-            self.blobs.discard(folder).await?;
-        }
-        let was_there = !folders.is_empty();
-        tracing::info!(resource.kind = kind.plural(), resource.id = %id, was_there, "resource deleted");
-        Ok(was_there)
+        self.reserve.lend(delete).await
     }
 }
 

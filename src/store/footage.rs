@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_film_whose_commit_was_made_keeps_its_folder_although_the_answer_was_lost() {
+    async fn committed_footage_keeps_its_folder_after_a_lost_reply() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let film = footage(1);
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_folder_of_which_nobody_knows_is_left_to_the_sweep() {
+    async fn folder_with_unknown_outcome_is_left_to_the_sweep() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let film = footage(1);
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn of_the_same_bytes_twice_at_once_one_folder_stays() {
+    async fn concurrent_uploads_of_the_same_bytes_leave_one_folder() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let (first, second) = (footage(1), footage(1));

@@ -10,11 +10,11 @@ use sqlx::types::Uuid;
 use super::{Error, Store, Transaction, sql};
 
 /// Time for which an answer is kept, milliseconds. Free choice.
-pub const KEPT_MS: i64 = 24 * 3600 * 1000;
+pub const ANSWER_LIFETIME_MS: i64 = 24 * 3600 * 1000;
 
 /// Time after which a running key counts as abandoned, milliseconds. Its request died with its process or
 /// failed to release it. Long enough for an upload over a slow connection.
-const LONGEST_REQUEST_MS: i64 = 3600 * 1000;
+const MAX_REQUEST_MS: i64 = 3600 * 1000;
 /// Time without renewal after which a key counts as abandoned if other processes share the database,
 /// milliseconds. Free choice.
 pub const LEASE_MS: i64 = 15_000;
@@ -62,7 +62,7 @@ impl Store {
     /// every third of [`LEASE_MS`].
     ///
     /// `body_sha256` is `None` if the body is not known before the request runs. Keys that are older than
-    /// [`KEPT_MS`] are deleted first.
+    /// [`ANSWER_LIFETIME_MS`] are deleted first.
     pub async fn begin_key(
         &self,
         scope: &Scope,
@@ -74,7 +74,7 @@ impl Store {
         let name = format!("key {} {} {}", scope.caller, scope.route, scope.key);
         transaction.lock(&name).await?;
         sql::query("delete from idempotency where created_ms <= $1")
-            .bind(now_ms - KEPT_MS)
+            .bind(now_ms - ANSWER_LIFETIME_MS)
             .execute(&mut transaction)
             .await?;
         let known: Option<(String, Uuid, Option<Vec<u8>>, i64)> = sql::query(
@@ -88,7 +88,7 @@ impl Store {
         .await?;
         let ids = match known {
             Some((state, _, _, heard_ms))
-                if state == "running" && !self.is_over(heard_ms, now_ms) =>
+                if state == "running" && !self.is_abandoned(heard_ms, now_ms) =>
             {
                 return Ok(Begun::Running);
             }
@@ -120,11 +120,11 @@ impl Store {
         Ok(Begun::Run(ids))
     }
 
-    /// Deletes keys that are older than [`KEPT_MS`], also if no new keys arrive.
+    /// Deletes keys that are older than [`ANSWER_LIFETIME_MS`], also if no new keys arrive.
     pub async fn forget_old_answers(&self, now_ms: i64) -> Result<(), Error> {
         let forget = || async {
             let sql = "delete from idempotency where created_ms <= $1";
-            let delete = sql::query(sql).bind(now_ms - KEPT_MS);
+            let delete = sql::query(sql).bind(now_ms - ANSWER_LIFETIME_MS);
             delete.execute(&self.writer).await?;
             Ok(())
         };
@@ -132,10 +132,11 @@ impl Store {
     }
 
     /// Returns whether a running request counts as abandoned. `heard_ms` is the time of its last renewal.
-    fn is_over(&self, heard_ms: i64, now_ms: i64) -> bool {
-        let longest_ms = match self.is_alone() {
-            true => LONGEST_REQUEST_MS,
-            false => LEASE_MS,
+    fn is_abandoned(&self, heard_ms: i64, now_ms: i64) -> bool {
+        let longest_ms = if self.is_alone() {
+            MAX_REQUEST_MS
+        } else {
+            LEASE_MS
         };
         heard_ms < now_ms - longest_ms
     }
@@ -230,7 +231,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn an_answer_is_kept_for_a_day_and_not_longer() {
+    async fn answer_is_stored_for_a_day() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let Begun::Run(first) = store.begin_key(&scope(), None, 0).await.unwrap() else {
@@ -243,20 +244,26 @@ mod tests {
             answer: b"{}".to_vec(),
         };
         store.finish_key(&scope(), &answer).await.unwrap();
-        let met = store.begin_key(&scope(), None, KEPT_MS - 1).await.unwrap();
+        let met = store
+            .begin_key(&scope(), None, ANSWER_LIFETIME_MS - 1)
+            .await
+            .unwrap();
         assert_eq!(met, Begun::Done(answer));
-        let met = store.begin_key(&scope(), None, KEPT_MS).await.unwrap();
+        let met = store
+            .begin_key(&scope(), None, ANSWER_LIFETIME_MS)
+            .await
+            .unwrap();
         assert!(matches!(met, Begun::Run(ids) if ids != first), "{met:?}");
     }
 
     #[tokio::test]
-    async fn a_key_that_nobody_gave_back_is_free_after_an_hour_or_a_lease_where_others_could_have_died()
-     {
+    async fn abandoned_key_expires() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
-        let longest_ms = match store.is_alone() {
-            true => LONGEST_REQUEST_MS,
-            false => LEASE_MS,
+        let longest_ms = if store.is_alone() {
+            MAX_REQUEST_MS
+        } else {
+            LEASE_MS
         };
         let first = store.begin_key(&scope(), None, 0).await.unwrap();
         let met = store.begin_key(&scope(), None, longest_ms).await;
@@ -266,7 +273,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn more_replays_at_once_than_there_are_connections_are_all_answered() {
+    async fn more_replays_than_connections_are_all_answered() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         store.begin_key(&scope(), None, 0).await.unwrap();
@@ -286,7 +293,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn an_interrupted_request_runs_again_under_its_ids_and_with_its_body() {
+    async fn interrupted_request_runs_again_with_its_ids_and_body() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let first = store.begin_key(&scope(), Some(&[1; 32]), 0).await.unwrap();
@@ -300,7 +307,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_key_whose_process_fell_silent_elsewhere_is_free_after_a_lease() {
+    async fn key_of_another_process_expires_after_a_lease_without_renewal() {
         let data = tempfile::tempdir().unwrap();
         let storage = fresh::storage(data.path());
         let (dead, other) = (

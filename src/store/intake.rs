@@ -75,10 +75,10 @@ impl Intake {
         }
         self.n_gathered += bytes.len();
         self.pieces.push(bytes);
-        match self.n_gathered < GATHERED_BYTES {
-            true => Ok(()),
-            false => self.write().await,
+        if self.n_gathered < GATHERED_BYTES {
+            return Ok(());
         }
+        self.write().await
     }
 
     /// Waits for the previous write, then starts to write the collected pieces.

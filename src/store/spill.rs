@@ -12,39 +12,39 @@ use std::sync::{OnceLock, PoisonError, RwLock};
 use crate::scratch::{Full, Scratch};
 
 /// Maximum number of bytes held in memory. Free choice.
-const BUDGET: usize = 48 << 20;
+const MAX_HELD_BYTES: usize = 48 << 20;
 
-/// A temporary storage. Data beyond the budget goes to a file in `folder`, created on first use.
+/// A temporary storage. Data beyond the limit goes to a file in `folder`, created on first use.
 #[derive(Debug)]
 pub struct Spill {
     folder: PathBuf,
     held: RwLock<Vec<u8>>,
-    budget: usize,
+    max_held_bytes: usize,
     file: OnceLock<File>,
     /// Bytes assigned to the file, including those still being written.
     spilled: AtomicU64,
 }
 
 impl Spill {
-    /// Returns an empty storage with a file in `folder`. The folder must exist once the budget is used up.
+    /// Returns an empty storage with a file in `folder`. The folder must exist once the limit is used up.
     pub fn into(folder: &Path) -> Spill {
-        Spill::with_budget(folder, BUDGET)
+        Spill::with_limit(folder, MAX_HELD_BYTES)
     }
 
-    fn with_budget(folder: &Path, budget: usize) -> Spill {
+    fn with_limit(folder: &Path, max_held_bytes: usize) -> Spill {
         Spill {
             folder: folder.to_owned(),
             held: RwLock::default(),
-            budget,
+            max_held_bytes,
             file: OnceLock::new(),
             spilled: AtomicU64::new(0),
         }
     }
 
-    /// Stores the bytes in memory and returns their offset; `None` if the budget is used up.
+    /// Stores the bytes in memory and returns their offset; `None` if the limit is used up.
     fn hold(&self, bytes: &[u8]) -> Option<u64> {
         let mut held = self.held.write().unwrap_or_else(PoisonError::into_inner);
-        if held.len() + bytes.len() > self.budget {
+        if held.len() + bytes.len() > self.max_held_bytes {
             return None;
         }
         let at = held.len() as u64;
@@ -71,17 +71,17 @@ impl Scratch for Spill {
             .spilled
             .fetch_add(bytes.len() as u64, Ordering::Relaxed);
         self.file()?.write_all_at(bytes, at)?;
-        Ok(self.budget as u64 + at)
+        Ok(self.max_held_bytes as u64 + at)
     }
 
     fn get(&self, at: u64, bytes: &mut [u8]) {
-        let Some(at_in_file) = at.checked_sub(self.budget as u64) else {
+        let Some(at_in_file) = at.checked_sub(self.max_held_bytes as u64) else {
             let held = self.held.read().unwrap_or_else(PoisonError::into_inner);
             return bytes.copy_from_slice(&held[at as usize..][..bytes.len()]);
         };
         self.file()
             .and_then(|file| file.read_exact_at(bytes, at_in_file))
-            .expect("what was put aside can be read back");
+            .expect("stored bytes can be read back");
     }
 }
 
@@ -90,9 +90,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_come_back_from_memory_and_from_the_file_which_has_no_name() {
+    fn bytes_are_read_back_from_memory_and_from_the_unnamed_file() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let spill = Spill::with_budget(folder.path(), 10);
+        let spill = Spill::with_limit(folder.path(), 10);
         let pieces: Vec<Vec<u8>> = (0..9u8).map(|k| vec![k; usize::from(k)]).collect();
         let places: Vec<u64> = pieces
             .iter()
@@ -109,8 +109,8 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_takes_no_file_is_an_error() {
-        let spill = Spill::with_budget(Path::new("/nowhere/at/all"), 0);
+    fn missing_folder_is_an_error() {
+        let spill = Spill::with_limit(Path::new("/nowhere/at/all"), 0);
         let error = spill.put(b"bytes").expect_err("there is no folder");
         assert_eq!(error.code(), crate::code::Code::Internal);
     }

@@ -71,9 +71,10 @@ impl Download<'_> {
             let range = format!("bytes {first}-{}/{size_bytes}", last - 1);
             answer = answer.header(header::CONTENT_RANGE, range);
         }
-        let body = match conditions.method == Method::HEAD {
-            true => Body::empty(),
-            false => self.bytes(store, first, last - first).await?,
+        let body = if conditions.method == Method::HEAD {
+            Body::empty()
+        } else {
+            self.bytes(store, first, last - first).await?
         };
         built(
             answer
@@ -138,7 +139,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_label_of_any_kind_stays_a_label() {
+    fn disposition_escapes_the_label() {
         assert_eq!(
             disposition("attachment", "a\"\r\nSet-Cookie: x.mp4"),
             "attachment; filename=\"a___Set-Cookie_ x.mp4\"; \

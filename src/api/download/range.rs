@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_range_is_read_as_the_rfc_reads_it() {
+    fn ranges_are_parsed_as_rfc_9110_says() {
         let part = |first, last| Wanted::Part { first, last };
         for (range, expected) in [
             ("bytes=0-0", part(0, 0)),
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn no_byte_of_an_empty_file_can_be_asked_for() {
+    fn ranges_of_an_empty_file_are_unsatisfiable() {
         assert_eq!(parse("bytes=0-", 0), Wanted::Unsatisfiable);
         assert_eq!(parse("bytes=-5", 0), Wanted::Unsatisfiable);
     }

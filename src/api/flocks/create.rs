@@ -1,17 +1,13 @@
 //! POST /v1/flocks: queues a job that makes a flock of a library, or first an analysis of a video that comes with
 //! the request.
 
-use axum::body::Body;
-use axum::extract::{FromRequest, Request, State};
-use axum::http::Response;
+use axum::extract::{FromRequest, Request};
 
 use super::{FlockAccepted, FlockForm, FlockRequest};
-use crate::api::AppState;
-use crate::api::access::Caller;
-use crate::api::extract::Json;
+use crate::api::extract::{Access, Json};
 use crate::api::footage::admit;
 use crate::api::jobs::{accepted, job_to_follow};
-use crate::api::problem::{Problem, ProblemBody};
+use crate::api::problem::{Answer, ProblemBody};
 use crate::api::receive::{Form, is_film, receive_with_json};
 use crate::flock::Params;
 use crate::formats::params;
@@ -38,62 +34,49 @@ use crate::store::footage::Added;
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(in crate::api) async fn create_flock(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     mut ids: IdSequence,
     request: Request,
-) -> Result<Response<Body>, Problem> {
+) -> Answer {
     if is_film(&request) {
-        return create_flock_of_film(&state, &caller, ids, request).await;
+        return create_flock_of_film(&access, ids, request).await;
     }
-    let Json(request) = Json::<FlockRequest>::from_request(request, &state).await?;
+    let Json(request) = Json::<FlockRequest>::from_request(request, &access.state).await?;
     let params: Params = params::read(request.params)?;
     let library_id = request.library_id;
-    let after_job = job_to_follow(&state, &caller, library_id).await?;
+    let after_job = job_to_follow(&access, library_id).await?;
     let input = Input { library_id, params };
-    queue(&state, &caller, input, after_job, &mut ids).await
+    queue(&access, input, after_job, &mut ids).await
 }
 
 /// Stores a video, queues its analysis, and queues the flock after that.
-async fn create_flock_of_film(
-    state: &AppState,
-    caller: &Caller,
-    mut ids: IdSequence,
-    request: Request,
-) -> Result<Response<Body>, Problem> {
+async fn create_flock_of_film(access: &Access, mut ids: IdSequence, request: Request) -> Answer {
     let form = Form {
         name: None,
-        owner: caller.account.owner.clone(),
+        owner: access.caller.account.owner.clone(),
         json_fields: &["params", "analysis"],
     };
-    let (received, mut fields) = receive_with_json(state, request, form).await?;
+    let (received, mut fields) = receive_with_json(&access.state, request, form).await?;
     let params = params::read(fields.remove("params").unwrap_or_default())?;
     let analysis_params = params::read(fields.remove("analysis").unwrap_or_default())?;
-    let (Added::New(footage) | Added::Known(footage)) = admit(state, received).await?;
+    let (Added::New(footage) | Added::Known(footage)) = admit(&access.state, received).await?;
     let analysis = analysis::Input {
         footage_id: FootageId(footage.id),
         params: analysis_params,
     };
-    let queued = state
-        .context
-        .enqueue(&analysis, None, &caller.account, &mut ids);
-    let (analysis_job, library_id) = queued.await?;
+    let (analysis_job, library_id) = access.enqueue(&analysis, None, &mut ids).await?;
     let input = Input { library_id, params };
-    queue(state, caller, input, Some(analysis_job), &mut ids).await
+    queue(access, input, Some(analysis_job), &mut ids).await
 }
 
 /// Queues a flock and returns 202. If `after_job` is given, the flock waits for that job.
 async fn queue(
-    state: &AppState,
-    caller: &Caller,
+    access: &Access,
     input: Input,
     after_job: Option<JobId>,
     ids: &mut IdSequence,
-) -> Result<Response<Body>, Problem> {
-    let queued = state
-        .context
-        .enqueue(&input, after_job, &caller.account, ids);
-    let (job_id, flock_id) = queued.await?;
+) -> Answer {
+    let (job_id, flock_id) = access.enqueue(&input, after_job, ids).await?;
     let body = FlockAccepted {
         job_id,
         flock_id,

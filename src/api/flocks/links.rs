@@ -6,20 +6,16 @@
 
 use std::ops::RangeInclusive;
 
-use axum::body::Body;
-use axum::extract::State;
-use axum::http::{Response, StatusCode};
+use axum::http::StatusCode;
 use axum::response::IntoResponse;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::FILES;
-use crate::api::AppState;
-use crate::api::access::{Caller, signed};
+use crate::api::access::signed;
 use crate::api::download::find as find_file;
-use crate::api::extract::{Id, Json};
-use crate::api::problem::{Problem, ProblemBody};
-use crate::api::resources::find;
+use crate::api::extract::{Access, Id, Json};
+use crate::api::problem::{Answer, Problem, ProblemBody};
 use crate::api::timestamp::rfc3339;
 use crate::code::Code;
 use crate::jobs::clock::now_ms;
@@ -69,19 +65,18 @@ fn default_lifetime_s() -> i64 {
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(in crate::api) async fn create_flock_link(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     Id(id): Id,
     Json(request): Json<LinkRequest>,
-) -> Result<Response<Body>, Problem> {
-    let flock = find::<Flock>(&state, &caller, id).await?;
+) -> Answer {
+    let flock = access.find::<Flock>(id).await?;
     let (name, _) = find_file(FILES, &request.file)?;
     if !LIFETIMES_S.contains(&request.expires_s) {
         let sentence = format!("expires_s must lie in 60..=604800: {}", request.expires_s);
         return Err(Problem::new(Code::InvalidParams, sentence));
     }
     let expires_s = now_ms() / 1000 + request.expires_s;
-    let key = state.context.store.signing_key().await?;
+    let key = access.store().signing_key().await?;
     let view = LinkView {
         url: signed(&key, &format!("/v1/flocks/{}/{name}", flock.id), expires_s),
         expires_at: rfc3339(expires_s * 1000),

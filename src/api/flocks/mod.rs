@@ -5,22 +5,18 @@ pub(super) mod create; // JSON or a form -> queued job
 pub(super) mod links; // signed links to files
 pub(super) mod preview; // flock.json without a video
 
-use axum::body::Body;
-use axum::extract::State;
-use axum::http::{Response, StatusCode};
+use axum::http::StatusCode;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::AppState;
-use super::access::Caller;
 use super::analyses::AnalysisOverrides;
 use super::download::{Download, Files, disposition, find as find_file};
-use super::extract::{Conditions, FileOf, Id};
+use super::extract::{Access, Conditions, FileOf, Id};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody};
-use super::resources::{View, delete, find, get, list};
+use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
+use super::resources::View;
 use super::timestamp::rfc3339;
 use crate::flock::Params;
 use crate::ids::{FlockId, JobId, LibraryId};
@@ -130,12 +126,8 @@ pub(super) struct FlockView {
     (status = 200, body = Page<FlockView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn list_flocks(
-    State(state): State<AppState>,
-    caller: Caller,
-    paging: Paging,
-) -> Result<axum::Json<Page<FlockView>>, Problem> {
-    list(&state, &caller, paging).await
+pub(super) async fn list_flocks(access: Access, paging: Paging) -> JsonAnswer<Page<FlockView>> {
+    access.list(paging).await
 }
 
 /// Get one flock: a summary, its parameters and advice.
@@ -145,12 +137,8 @@ pub(super) async fn list_flocks(
     (status = 200, body = FlockView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn get_flock(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<axum::Json<FlockView>, Problem> {
-    get(&state, &caller, id).await
+pub(super) async fn get_flock(access: Access, Id(id): Id) -> JsonAnswer<FlockView> {
+    access.get(id).await
 }
 
 /// Delete a flock and its job.
@@ -158,12 +146,8 @@ pub(super) async fn get_flock(
     (status = 204, description = "deleted"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn delete_flock(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<StatusCode, Problem> {
-    delete::<Flock>(&state, &caller, id).await
+pub(super) async fn delete_flock(access: Access, Id(id): Id) -> Result<StatusCode, Problem> {
+    access.delete::<Flock>(id).await
 }
 
 /// Download a file of a flock.
@@ -185,13 +169,12 @@ pub(super) async fn delete_flock(
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_flock_file(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     FileOf(id, name): FileOf,
     conditions: Conditions,
-) -> Result<Response<Body>, Problem> {
+) -> Answer {
     let (name, media_type) = find_file(FILES, &name)?;
-    let flock = find::<Flock>(&state, &caller, id).await?;
+    let flock = access.find::<Flock>(id).await?;
     // A browser cannot show these, so it saves them.
     let kind = match media_type {
         "application/zip" | "video/quicktime" => "attachment",
@@ -203,7 +186,7 @@ pub(super) async fn get_flock_file(
         media_type,
         disposition: disposition(kind, &saved_name(name, id)),
     };
-    download.answer(&state.context.store, &conditions).await
+    download.answer(access.store(), &conditions).await
 }
 
 /// Returns the name under which a browser saves the file.

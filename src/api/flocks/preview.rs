@@ -1,16 +1,11 @@
 //! POST /v1/flocks/preview: simulates and plans a flock while the client waits, without a video.
 
-use axum::body::Body;
-use axum::extract::State;
-use axum::http::{Response, header};
+use axum::http::header;
 use axum::response::IntoResponse;
 
 use super::FlockRequest;
-use crate::api::AppState;
-use crate::api::access::Caller;
-use crate::api::extract::Json;
-use crate::api::problem::{Problem, ProblemBody};
-use crate::api::resources::find;
+use crate::api::extract::{Access, Json};
+use crate::api::problem::{Answer, Problem, ProblemBody};
 use crate::code::Code;
 use crate::flock::Params;
 use crate::formats::params;
@@ -34,10 +29,9 @@ const MAX_PREVIEWED_POSES: u64 = 200_000;
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(in crate::api) async fn preview_flock(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     Json(request): Json<FlockRequest>,
-) -> Result<Response<Body>, Problem> {
+) -> Answer {
     let params: Params = params::read(request.params)?;
     let n_poses = u64::from(params.most_individuals()) * u64::from(params.frames);
     if n_poses > MAX_PREVIEWED_POSES {
@@ -46,8 +40,8 @@ pub(in crate::api) async fn preview_flock(
         );
         return Err(Problem::new(Code::InvalidParams, sentence));
     }
-    let library = find::<Library>(&state, &caller, request.library_id.0).await?;
-    let flock = synchronous::preview_flock(&state.context, &library, params).await?;
+    let library = access.find::<Library>(request.library_id.0).await?;
+    let flock = synchronous::preview_flock(&access.state.context, &library, params).await?;
     let json = [(header::CONTENT_TYPE, "application/json")];
     Ok((json, flock).into_response())
 }

@@ -11,7 +11,6 @@ use std::convert::Infallible;
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::extract::State;
 use axum::http::{HeaderMap, Response};
 use axum::response::IntoResponse;
 use axum::response::sse::{Event, KeepAlive, Sse};
@@ -21,10 +20,8 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::{JobView, find, is_final};
-use crate::api::AppState;
-use crate::api::access::Caller;
-use crate::api::extract::Id;
-use crate::api::problem::{Problem, ProblemBody};
+use crate::api::extract::{Access, Id};
+use crate::api::problem::{Answer, ProblemBody};
 use crate::ids::JobId;
 use crate::jobs::clock::now_ms;
 use crate::store;
@@ -78,17 +75,12 @@ pub(in crate::api) struct JobEvent {
     (status = 200, content_type = "text/event-stream", body = JobEvent),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(in crate::api) async fn get_events(
-    State(state): State<AppState>,
-    caller: Caller,
-    headers: HeaderMap,
-) -> Response<Body> {
+pub(in crate::api) async fn get_events(access: Access, headers: HeaderMap) -> Response<Body> {
     let last = headers.get("last-event-id");
     let last_ms = last.and_then(|id| id.to_str().ok()?.parse().ok());
     let last_ms = last_ms.map(|id_ms| resume_time(id_ms, now_ms()));
     let stream = JobStream {
-        state,
-        caller,
+        access,
         seen: BTreeMap::new(),
         ready: VecDeque::from([Event::default().retry(RECONNECT_DELAY)]),
         last_ms,
@@ -108,20 +100,16 @@ pub(in crate::api) async fn get_events(
     (status = 200, content_type = "text/event-stream", body = JobEvent),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(in crate::api) async fn get_job_events(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<Response<Body>, Problem> {
-    let job = find(&state, &caller, JobId(id)).await?;
-    let start = (state, caller, None, Some(job));
-    let events = unfold(start, async |(state, caller, last, first)| {
+pub(in crate::api) async fn get_job_events(access: Access, Id(id): Id) -> Answer {
+    let job = find(&access, JobId(id)).await?;
+    let start = (access, None, Some(job));
+    let events = unfold(start, async |(access, last, first)| {
         let job = match first {
             Some(first) => first,
-            None => next_change(&state, &caller, last.as_ref()?).await?,
+            None => next_change(&access, last.as_ref()?).await?,
         };
         let event = Event::default().event("job").json_data(&job).ok()?;
-        Some((Ok(event), (state, caller, Some(job), None)))
+        Some((Ok(event), (access, Some(job), None)))
     });
     Ok(answer(events))
 }
@@ -136,9 +124,9 @@ where
 }
 
 /// Returns the next state that differs from `last`, or `None` after a final state or if the stream must end.
-async fn next_change(state: &AppState, caller: &Caller, last: &JobView) -> Option<JobView> {
-    while !is_final(last) && wait(state, caller).await {
-        let job = find(state, caller, last.id).await.ok()?;
+async fn next_change(access: &Access, last: &JobView) -> Option<JobView> {
+    while !is_final(last) && wait(access).await {
+        let job = find(access, last.id).await.ok()?;
         if job != *last {
             return Some(job);
         }
@@ -147,18 +135,17 @@ async fn next_change(state: &AppState, caller: &Caller, last: &JobView) -> Optio
 }
 
 /// Waits until the next query is due. Returns false if the stream must end instead.
-async fn wait(state: &AppState, caller: &Caller) -> bool {
-    let draining = &state.context.draining;
+async fn wait(access: &Access) -> bool {
+    let draining = &access.state.context.draining;
     tokio::select! {
-        () = tokio::time::sleep(POLL_INTERVAL) => caller.is_still_valid(state).await,
+        () = tokio::time::sleep(POLL_INTERVAL) => access.caller.is_still_valid(&access.state).await,
         () = draining.cancelled() => false,
     }
 }
 
 /// State of a stream of all jobs.
 struct JobStream {
-    state: AppState,
-    caller: Caller,
+    access: Access,
     /// Last known state of every job that may still change or was found by the last query.
     seen: BTreeMap<JobId, JobView>,
     /// Events to send.
@@ -176,7 +163,7 @@ impl JobStream {
             if let Some(event) = self.ready.pop_front() {
                 return Some(event);
             }
-            if self.queried_ms.is_some() && !wait(&self.state, &self.caller).await {
+            if self.queried_ms.is_some() && !wait(&self.access).await {
                 return None;
             }
             if let Err(error) = self.query().await {
@@ -218,7 +205,7 @@ impl JobStream {
     /// Returns the jobs that may have changed since the last query. It includes all that were unfinished
     /// then, unless they were deleted.
     async fn rows(&self, now_ms: i64) -> Result<Vec<JobRow>, store::Error> {
-        let (store, owners) = (&self.state.context.store, &self.caller.owners);
+        let (store, owners) = (self.access.store(), &self.access.caller.owners);
         let since_ms = self.queried_ms.or(self.last_ms).unwrap_or(now_ms) - OVERLAP_MS;
         let mut rows = store.jobs_under_way(since_ms, owners).await?;
         if self.queried_ms.is_none() && self.last_ms.is_some() {

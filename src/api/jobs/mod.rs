@@ -5,7 +5,6 @@ pub(super) mod events; // server-sent events
 pub(super) mod wait; // Prefer: wait=N
 
 use axum::body::Body;
-use axum::extract::State;
 use axum::http::{HeaderMap, Response, StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
@@ -13,17 +12,15 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use self::wait::Wait;
-use super::AppState;
-use super::access::Caller;
-use super::extract::Id;
+use super::extract::{Access, Id};
 use super::paging::{Page, Paging};
-use super::problem::{Problem, ProblemBody};
+use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::timestamp::rfc3339;
 
 use crate::code::Code;
 use crate::ids::{JobId, LibraryId};
 use crate::jobs::clock::now_ms;
-use crate::jobs::refusal::NAME;
+use crate::jobs::refusal::FILE_NAME;
 use crate::store::jobs::cancel::Cancel;
 use crate::store::jobs::read::JobRow;
 use crate::store::jobs::{JobState, Kind};
@@ -102,16 +99,10 @@ pub(super) struct JobLinks {
     (status = 200, body = Page<JobView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn list_jobs(
-    State(state): State<AppState>,
-    caller: Caller,
-    paging: Paging,
-) -> Result<axum::Json<Page<JobView>>, Problem> {
-    let store = &state.context.store;
-    let rows = store
-        .list_jobs(paging.n_rows(), paging.cursor, &caller.owners)
-        .await?;
-    let views = rows.into_iter().map(JobView::from).collect();
+pub(super) async fn list_jobs(access: Access, paging: Paging) -> JsonAnswer<Page<JobView>> {
+    let (limit, owners) = (paging.n_rows(), &access.caller.owners);
+    let rows = access.store().list_jobs(limit, paging.cursor, owners);
+    let views = rows.await?.into_iter().map(JobView::from).collect();
     Ok(axum::Json(Page::new(views, paging, |view: &JobView| {
         view.id.0
     })))
@@ -124,17 +115,12 @@ pub(super) async fn list_jobs(
     (status = 200, body = JobView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn get_job(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-    headers: HeaderMap,
-) -> Result<Response<Body>, Problem> {
-    let job = find(&state, &caller, JobId(id)).await?;
+pub(super) async fn get_job(access: Access, Id(id): Id, headers: HeaderMap) -> Answer {
+    let job = find(&access, JobId(id)).await?;
     let Some(wait) = Wait::from_headers(&headers) else {
         return Ok(axum::Json(job).into_response());
     };
-    let job = wait.until_ended(&state, job.id).await?;
+    let job = wait.until_ended(&access.state, job.id).await?;
     let job = job.map(JobView::from).ok_or_else(Problem::not_found)?;
     let mut answer = axum::Json(job).into_response();
     wait.mark_applied(answer.headers_mut());
@@ -150,12 +136,11 @@ pub(super) async fn get_job(
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_refused_jpeg(
-    State(state): State<AppState>,
-    caller: Caller,
+    access: Access,
     Id(id): Id,
 ) -> Result<impl IntoResponse, Problem> {
-    let store = &state.context.store;
-    let jpeg = store.refused_jpeg(JobId(id), &caller.owners).await?;
+    let store = access.store();
+    let jpeg = store.refused_jpeg(JobId(id), &access.caller.owners).await?;
     let jpeg = jpeg.ok_or_else(Problem::not_found)?;
     let headers = [
         (header::CONTENT_TYPE, "image/jpeg"),
@@ -176,28 +161,20 @@ pub(super) async fn get_refused_jpeg(
     (status = 202, body = JobView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn cancel_job(
-    State(state): State<AppState>,
-    caller: Caller,
-    Id(id): Id,
-) -> Result<Response<Body>, Problem> {
-    let status = match state
-        .context
-        .store
-        .cancel(JobId(id), &caller.owners, now_ms())
-        .await?
-    {
+pub(super) async fn cancel_job(access: Access, Id(id): Id) -> Answer {
+    let owners = &access.caller.owners;
+    let status = match access.store().cancel(JobId(id), owners, now_ms()).await? {
         Cancel::Cancelled => StatusCode::OK,
         Cancel::Requested => StatusCode::ACCEPTED,
         Cancel::Final(_) => return Err(Code::AlreadyFinished.into()),
         Cancel::Absent => return Err(Problem::not_found()),
     };
-    let job = find(&state, &caller, JobId(id)).await?;
+    let job = find(&access, JobId(id)).await?;
     Ok((status, axum::Json(job)).into_response())
 }
 
-async fn find(state: &AppState, caller: &Caller, id: JobId) -> Result<JobView, Problem> {
-    let job = state.context.store.job(id, &caller.owners).await?;
+async fn find(access: &Access, id: JobId) -> Result<JobView, Problem> {
+    let job = access.store().job(id, &access.caller.owners).await?;
     job.map(JobView::from).ok_or_else(Problem::not_found)
 }
 
@@ -213,12 +190,8 @@ pub(super) fn accepted(job: JobId, result: &str, body: impl Serialize) -> Respon
 
 /// Returns the problem for an absent result: `not_ready` with the state of its job, or `not_found` if no job
 /// makes it.
-pub(super) async fn absent_result(
-    state: &AppState,
-    caller: &Caller,
-    result: Uuid,
-) -> Result<Problem, Problem> {
-    let job = state.context.store.job_of_result(result, &caller.owners);
+pub(super) async fn absent_result(access: &Access, result: Uuid) -> Result<Problem, Problem> {
+    let job = access.store().job_of_result(result, &access.caller.owners);
     let Some(job) = job.await? else {
         return Ok(Problem::not_found());
     };
@@ -233,16 +206,18 @@ pub(super) async fn absent_result(
 /// Returns the analysis that must finish before a library can be used, or `None` if the library exists. Fails
 /// with `invalid_params` if there is no such library and no unfinished analysis makes it.
 pub(super) async fn job_to_follow(
-    state: &AppState,
-    caller: &Caller,
+    access: &Access,
     library_id: LibraryId,
 ) -> Result<Option<JobId>, Problem> {
-    let store = &state.context.store;
-    let library = store.resource::<Library>(library_id.0, &caller.owners);
+    let store = access.store();
+    let library = store.resource::<Library>(library_id.0, &access.caller.owners);
     if library.await?.is_some() {
         return Ok(None);
     }
-    match store.job_of_result(library_id.0, &caller.owners).await? {
+    match store
+        .job_of_result(library_id.0, &access.caller.owners)
+        .await?
+    {
         Some(job)
             if job.kind == Kind::Analysis
                 && !matches!(job.state, JobState::Failed | JobState::Cancelled) =>
@@ -286,7 +261,7 @@ impl From<JobRow> for JobView {
             attempt: row.attempt,
             cancel_requested: row.cancel_requested,
             error: row.failure().map(|failure| JobFailure {
-                picture: row.has_picture.then(|| format!("{path}/{NAME}")),
+                picture: row.has_picture.then(|| format!("{path}/{FILE_NAME}")),
                 code: failure.code.name(),
                 title: failure.code.meaning(),
                 detail: failure.detail,

@@ -143,9 +143,10 @@ fn log(route: &str, status: u16, took: Duration) {
         || ["/static/", "/vendor/"]
             .iter()
             .any(|start| route.starts_with(start));
-    match is_frequent {
-        true => tracing::debug!(route, status, duration_ms, "request answered"),
-        false => tracing::info!(route, status, duration_ms, "request answered"),
+    if is_frequent {
+        tracing::debug!(route, status, duration_ms, "request answered");
+    } else {
+        tracing::info!(route, status, duration_ms, "request answered");
     }
 }
 
@@ -167,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_id_that_could_forge_a_line_is_replaced() {
+    fn request_id_that_could_forge_a_log_line_is_replaced() {
         let of = |id: &'static str| {
             id_of(&HeaderMap::from_iter([(
                 REQUEST_ID,

@@ -122,12 +122,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_becomes_html_and_program_text_is_marked() {
+    fn text_is_escaped_and_code_is_marked() {
         assert_eq!(marked("a < b & `c`."), "a &lt; b &amp; <code>c</code>.");
     }
 
     #[test]
-    fn the_files_of_the_description_are_inside_the_program() {
+    fn swagger_files_are_embedded() {
         let sizes: Vec<_> = LOADED.iter().map(|file| file.bytes.len()).collect();
         assert!(
             sizes.len() == 2 && sizes.iter().all(|&n_bytes| n_bytes > 50_000),

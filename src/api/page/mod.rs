@@ -64,10 +64,10 @@ pub(super) fn tagged(
         (header::ETAG, etag.to_owned()),
         (header::CACHE_CONTROL, "no-cache".to_owned()),
     ];
-    match is_known {
-        true => (StatusCode::NOT_MODIFIED, tags).into_response(),
-        false => (tags, answer()).into_response(),
+    if is_known {
+        return (StatusCode::NOT_MODIFIED, tags).into_response();
     }
+    (tags, answer()).into_response()
 }
 
 fn etag(file: &EmbeddedFile) -> String {

@@ -14,9 +14,10 @@ impl Store {
         let of_rows = self.mark_of_rows().await?;
         let of_files = self.mark_of_files().await?;
         if let (Some(of_rows), Some(of_files)) = (&of_rows, &of_files) {
-            return match hex(of_rows) == *of_files {
-                true => Ok(()),
-                false => Err(Error::ForeignFiles),
+            return if hex(of_rows) == *of_files {
+                Ok(())
+            } else {
+                Err(Error::ForeignFiles)
             };
         }
         if !self.knows_files().await? {
@@ -107,7 +108,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn rows_that_are_not_the_files_own_are_refused_before_anything_is_swept() {
+    async fn foreign_database_is_refused_and_nothing_is_swept() {
         let [own, other, files] = [(); 3].map(|()| tempfile::tempdir().unwrap());
         open(own.path(), files.path()).await.unwrap();
         let film = files.path().join("footage/a");
@@ -119,7 +120,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn files_without_a_mark_are_taken_over_by_rows_that_know_them_alone() {
+    async fn unmarked_files_are_adopted_only_by_a_database_that_knows_them() {
         let [own, other, files] = [(); 3].map(|()| tempfile::tempdir().unwrap());
         let store = Store::open(storage(own.path(), files.path()))
             .await
@@ -142,7 +143,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn an_empty_place_for_files_is_anybodys() {
+    async fn empty_store_is_adopted_by_any_database() {
         let [own, other, files] = [(); 3].map(|()| tempfile::tempdir().unwrap());
         open(own.path(), files.path()).await.unwrap();
         open(other.path(), files.path()).await.unwrap();

@@ -27,43 +27,38 @@ impl Store {
         owners: &OwnerFilter,
         now_ms: i64,
     ) -> Result<Cancel, Error> {
-        let cancel = || self.cancel_now(job, owners, now_ms);
+        let cancel = || async {
+            let mut transaction = self.writer.begin().await?;
+            let sql =
+                "select state from jobs where id = $1 and ($2 is null or owner = $2) for update";
+            let state: Option<String> = sql::query_scalar(sql)
+                .bind(job.0)
+                .bind(owners.parameter())
+                .fetch_optional(&mut transaction)
+                .await?;
+            let Some(state) = state else {
+                return Ok(Cancel::Absent);
+            };
+            let met = match JobState::try_from(state)? {
+                JobState::Queued => {
+                    let sql = "update jobs set state = 'cancelled', finished_ms = $2 where id = $1";
+                    let update = sql::query(sql).bind(job.0).bind(now_ms);
+                    update.execute(&mut transaction).await?;
+                    cancel_followers(&mut transaction, job.0, now_ms).await?;
+                    Cancel::Cancelled
+                }
+                JobState::Running => {
+                    let update =
+                        sql::query("update jobs set cancel_requested = true where id = $1");
+                    update.bind(job.0).execute(&mut transaction).await?;
+                    Cancel::Requested
+                }
+                ended => Cancel::Final(ended),
+            };
+            transaction.commit().await?;
+            tracing::info!(job.id = %job, ?met, "job cancellation requested");
+            Ok(met)
+        };
         self.reserve.lend(cancel).await
-    }
-
-    async fn cancel_now(
-        &self,
-        job: JobId,
-        owners: &OwnerFilter,
-        now_ms: i64,
-    ) -> Result<Cancel, Error> {
-        let mut transaction = self.writer.begin().await?;
-        let sql = "select state from jobs where id = $1 and ($2 is null or owner = $2) for update";
-        let state: Option<String> = sql::query_scalar(sql)
-            .bind(job.0)
-            .bind(owners.parameter())
-            .fetch_optional(&mut transaction)
-            .await?;
-        let Some(state) = state else {
-            return Ok(Cancel::Absent);
-        };
-        let met = match JobState::try_from(state)? {
-            JobState::Queued => {
-                let sql = "update jobs set state = 'cancelled', finished_ms = $2 where id = $1";
-                let update = sql::query(sql).bind(job.0).bind(now_ms);
-                update.execute(&mut transaction).await?;
-                cancel_followers(&mut transaction, job.0, now_ms).await?;
-                Cancel::Cancelled
-            }
-            JobState::Running => {
-                let update = sql::query("update jobs set cancel_requested = true where id = $1");
-                update.bind(job.0).execute(&mut transaction).await?;
-                Cancel::Requested
-            }
-            ended => Cancel::Final(ended),
-        };
-        transaction.commit().await?;
-        tracing::info!(job.id = %job, ?met, "job cancellation requested");
-        Ok(met)
     }
 }

@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_id_made_later_is_not_before_the_first_of_its_time() {
+    fn first_id_of_a_time_precedes_ids_made_then() {
         let id = Uuid::now_v7();
         let (seconds, nanos) = id.get_timestamp().unwrap().to_unix();
         let made_ms = seconds as i64 * 1000 + i64::from(nanos) / 1_000_000;

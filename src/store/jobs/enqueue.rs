@@ -92,7 +92,7 @@ impl QueuedJobs {
     ///
     /// An error means that the connection is lost. The caller must then subscribe again.
     pub async fn next(&mut self) -> Result<(), Error> {
-        Ok(self.0.heard().await?)
+        Ok(self.0.next().await?)
     }
 }
 
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_job_that_comes_after_the_end_of_the_one_it_waits_for_does_not_wait_for_ever() {
+    async fn new_follower_of_an_ended_job_ends_at_once() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let state_after = async |before: &NewJob| {

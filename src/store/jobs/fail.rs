@@ -16,61 +16,51 @@ impl Store {
         picture: Option<&[u8]>,
         now_ms: i64,
     ) -> Result<Change, Error> {
-        let fail = || self.fail_now(lease, code, detail, picture, now_ms);
+        let fail = || async {
+            let mut transaction = self.writer.begin().await?;
+            let n_rows = sql::query(
+                "update jobs set state = 'failed', worker = null, lease_until_ms = null, \
+                 code = $3, detail = $4, refused_jpeg = $5, finished_ms = $6 \
+                 where id = $1 and fence = $2 and state = 'running'",
+            )
+            .bind(lease.job_id.0)
+            .bind(lease.fence)
+            .bind(code.name())
+            .bind(detail)
+            .bind(picture)
+            .bind(now_ms)
+            .execute(&mut transaction)
+            .await?;
+            if Change::from_rows(n_rows) == Change::Made {
+                fail_followers(&mut transaction, lease.job_id.0, now_ms).await?;
+            }
+            transaction.commit().await?;
+            tracing::info!(job.id = %lease.job_id, %code, n_rows, "job failed");
+            Ok(Change::from_rows(n_rows))
+        };
         self.reserve.lend(fail).await
-    }
-
-    async fn fail_now(
-        &self,
-        lease: &Lease,
-        code: Code,
-        detail: &str,
-        picture: Option<&[u8]>,
-        now_ms: i64,
-    ) -> Result<Change, Error> {
-        let mut transaction = self.writer.begin().await?;
-        let n_rows = sql::query(
-            "update jobs set state = 'failed', worker = null, lease_until_ms = null, \
-             code = $3, detail = $4, refused_jpeg = $5, finished_ms = $6 \
-             where id = $1 and fence = $2 and state = 'running'",
-        )
-        .bind(lease.job_id.0)
-        .bind(lease.fence)
-        .bind(code.name())
-        .bind(detail)
-        .bind(picture)
-        .bind(now_ms)
-        .execute(&mut transaction)
-        .await?;
-        if Change::of_rows(n_rows) == Change::Made {
-            fail_followers(&mut transaction, lease.job_id.0, now_ms).await?;
-        }
-        transaction.commit().await?;
-        tracing::info!(job.id = %lease.job_id, %code, n_rows, "job failed");
-        Ok(Change::of_rows(n_rows))
     }
 
     /// Ends a running job as cancelled, after its worker has stopped the work.
     pub async fn stop(&self, lease: &Lease, now_ms: i64) -> Result<Change, Error> {
-        self.reserve.lend(|| self.stop_now(lease, now_ms)).await
-    }
-
-    async fn stop_now(&self, lease: &Lease, now_ms: i64) -> Result<Change, Error> {
-        let mut transaction = self.writer.begin().await?;
-        let n_rows = sql::query(
-            "update jobs set state = 'cancelled', worker = null, lease_until_ms = null, \
-             finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
-        )
-        .bind(lease.job_id.0)
-        .bind(lease.fence)
-        .bind(now_ms)
-        .execute(&mut transaction)
-        .await?;
-        if Change::of_rows(n_rows) == Change::Made {
-            cancel_followers(&mut transaction, lease.job_id.0, now_ms).await?;
-        }
-        transaction.commit().await?;
-        tracing::info!(job.id = %lease.job_id, n_rows, "job stopped");
-        Ok(Change::of_rows(n_rows))
+        let stop = || async {
+            let mut transaction = self.writer.begin().await?;
+            let n_rows = sql::query(
+                "update jobs set state = 'cancelled', worker = null, lease_until_ms = null, \
+                 finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
+            )
+            .bind(lease.job_id.0)
+            .bind(lease.fence)
+            .bind(now_ms)
+            .execute(&mut transaction)
+            .await?;
+            if Change::from_rows(n_rows) == Change::Made {
+                cancel_followers(&mut transaction, lease.job_id.0, now_ms).await?;
+            }
+            transaction.commit().await?;
+            tracing::info!(job.id = %lease.job_id, n_rows, "job stopped");
+            Ok(Change::from_rows(n_rows))
+        };
+        self.reserve.lend(stop).await
     }
 }

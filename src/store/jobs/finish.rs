@@ -41,35 +41,28 @@ impl Store {
         outcome: &Outcome,
         now_ms: i64,
     ) -> Result<Change, Error> {
-        let finish = || self.finish_now(lease, outcome, now_ms);
+        let finish = || async {
+            let mut transaction = self.writer.begin().await?;
+            let n_rows = sql::query(
+                "update jobs set state = 'done', worker = null, lease_until_ms = null, stage = null, \
+                 progress = 1, finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
+            )
+            .bind(lease.job_id.0)
+            .bind(lease.fence)
+            .bind(now_ms)
+            .execute(&mut transaction)
+            .await?;
+            if Change::from_rows(n_rows) == Change::Lost {
+                tracing::warn!(job.id = %lease.job_id, fence = lease.fence, "job result discarded: its lease was lost");
+                return Ok(Change::Lost);
+            }
+            blobs::insert(&mut transaction, &outcome.folder, &outcome.files).await?;
+            insert(&mut transaction, lease, outcome, now_ms).await?;
+            transaction.commit().await?;
+            tracing::info!(job.id = %lease.job_id, fence = lease.fence, "job done");
+            Ok(Change::Made)
+        };
         self.reserve.lend(finish).await
-    }
-
-    async fn finish_now(
-        &self,
-        lease: &Lease,
-        outcome: &Outcome,
-        now_ms: i64,
-    ) -> Result<Change, Error> {
-        let mut transaction = self.writer.begin().await?;
-        let n_rows = sql::query(
-            "update jobs set state = 'done', worker = null, lease_until_ms = null, stage = null, \
-             progress = 1, finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
-        )
-        .bind(lease.job_id.0)
-        .bind(lease.fence)
-        .bind(now_ms)
-        .execute(&mut transaction)
-        .await?;
-        if Change::of_rows(n_rows) == Change::Lost {
-            tracing::warn!(job.id = %lease.job_id, fence = lease.fence, "job result discarded: its lease was lost");
-            return Ok(Change::Lost);
-        }
-        blobs::insert(&mut transaction, &outcome.folder, &outcome.files).await?;
-        insert(&mut transaction, lease, outcome, now_ms).await?;
-        transaction.commit().await?;
-        tracing::info!(job.id = %lease.job_id, fence = lease.fence, "job done");
-        Ok(Change::Made)
     }
 }
 

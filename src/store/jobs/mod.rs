@@ -145,7 +145,7 @@ impl JobState {
 }
 
 impl Change {
-    fn of_rows(n_rows: u64) -> Change {
+    fn from_rows(n_rows: u64) -> Change {
         match n_rows {
             0 => Change::Lost,
             _ => Change::Made,

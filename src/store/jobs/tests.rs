@@ -112,7 +112,7 @@ impl Queue {
 }
 
 #[tokio::test]
-async fn jobs_are_claimed_by_priority_and_then_in_turn_each_once() {
+async fn jobs_are_claimed_once_by_priority_and_age() {
     let queue = Queue::open().await;
     let first = queue.enqueue(None).await;
     let second = queue.enqueue(None).await;
@@ -125,7 +125,7 @@ async fn jobs_are_claimed_by_priority_and_then_in_turn_each_once() {
 }
 
 #[tokio::test]
-async fn a_heartbeat_keeps_the_job_from_being_rescued() {
+async fn heartbeat_prevents_rescue() {
     let queue = Queue::open().await;
     queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
@@ -137,7 +137,7 @@ async fn a_heartbeat_keeps_the_job_from_being_rescued() {
 }
 
 #[tokio::test]
-async fn finishing_links_the_result_in_the_same_step() {
+async fn finish_links_the_result() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
@@ -153,7 +153,7 @@ async fn finishing_links_the_result_in_the_same_step() {
 }
 
 #[tokio::test]
-async fn a_worker_that_was_given_up_changes_nothing() {
+async fn worker_with_an_old_fence_changes_nothing() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     let stale = queue.claim(0).await.unwrap();
@@ -176,7 +176,7 @@ async fn a_worker_that_was_given_up_changes_nothing() {
 }
 
 #[tokio::test]
-async fn a_rescued_job_keeps_its_attempt_count() {
+async fn rescued_job_keeps_its_attempt_count() {
     let queue = Queue::open().await;
     queue.enqueue(None).await;
     queue.claim(0).await.unwrap();
@@ -185,7 +185,7 @@ async fn a_rescued_job_keeps_its_attempt_count() {
 }
 
 #[tokio::test]
-async fn a_job_that_kills_its_worker_twice_is_quarantined() {
+async fn job_is_quarantined_after_two_crashes() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     for _ in 0..2 {
@@ -204,7 +204,7 @@ async fn a_job_that_kills_its_worker_twice_is_quarantined() {
 }
 
 #[tokio::test]
-async fn a_retried_job_waits_for_its_time_and_counts_the_attempt() {
+async fn retried_job_waits_and_counts_the_attempt() {
     let queue = Queue::open().await;
     queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
@@ -215,7 +215,7 @@ async fn a_retried_job_waits_for_its_time_and_counts_the_attempt() {
 }
 
 #[tokio::test]
-async fn a_released_job_has_not_used_its_attempt() {
+async fn released_job_does_not_count_the_attempt() {
     let queue = Queue::open().await;
     queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
@@ -225,7 +225,7 @@ async fn a_released_job_has_not_used_its_attempt() {
 }
 
 #[tokio::test]
-async fn a_queued_job_is_cancelled_at_once_with_what_follows_it() {
+async fn queued_job_is_cancelled_with_its_followers() {
     let queue = Queue::open().await;
     let first = queue.enqueue(None).await;
     let second = queue.enqueue(Some(first)).await;
@@ -246,7 +246,7 @@ async fn a_queued_job_is_cancelled_at_once_with_what_follows_it() {
 }
 
 #[tokio::test]
-async fn a_running_job_learns_of_its_cancelling_by_its_heartbeat() {
+async fn heartbeat_reports_a_cancel_request() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
@@ -261,7 +261,7 @@ async fn a_running_job_learns_of_its_cancelling_by_its_heartbeat() {
 }
 
 #[tokio::test]
-async fn a_job_whose_worker_died_before_it_could_be_cancelled_is_cancelled() {
+async fn rescue_cancels_a_job_with_a_cancel_request() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     queue.claim(0).await.unwrap();
@@ -274,7 +274,7 @@ async fn a_job_whose_worker_died_before_it_could_be_cancelled_is_cancelled() {
 }
 
 #[tokio::test]
-async fn a_job_that_follows_waits_until_the_first_is_done() {
+async fn follower_waits_until_its_predecessor_is_done() {
     let queue = Queue::open().await;
     let first = queue.enqueue(None).await;
     let second = queue.enqueue_at(Some(first), 9).await;
@@ -286,7 +286,7 @@ async fn a_job_that_follows_waits_until_the_first_is_done() {
 }
 
 #[tokio::test]
-async fn a_job_that_follows_a_failed_one_fails_with_it() {
+async fn follower_of_a_failed_job_fails() {
     let queue = Queue::open().await;
     let first = queue.enqueue(None).await;
     let second = queue.enqueue(Some(first)).await;
@@ -305,7 +305,7 @@ async fn a_job_that_follows_a_failed_one_fails_with_it() {
 }
 
 #[tokio::test]
-async fn claims_that_race_give_each_job_to_one_worker() {
+async fn concurrent_claims_give_each_job_to_one_worker() {
     let queue = Queue::open().await;
     for _ in 0..100 {
         queue.enqueue(None).await;
@@ -329,7 +329,7 @@ async fn claims_that_race_give_each_job_to_one_worker() {
 }
 
 #[tokio::test]
-async fn a_folder_is_served_by_one_process_at_a_time() {
+async fn second_store_in_a_folder_is_refused() {
     let data = tempfile::tempdir().unwrap();
     let first = Store::open(data.path()).await.unwrap();
     let second = Store::open(data.path()).await;
@@ -371,13 +371,13 @@ async fn n_before_the_other(n_workers: usize) -> usize {
 }
 
 #[tokio::test]
-async fn whoever_queues_one_job_does_not_wait_for_five_hundred_of_another() {
+async fn one_job_does_not_wait_for_five_hundred_of_another_owner() {
     assert_eq!(n_before_the_other(1).await, 0);
     assert_eq!(n_before_the_other(3).await, 0);
 }
 
 #[tokio::test]
-async fn owners_take_turns_job_by_job() {
+async fn owners_take_turns() {
     let queue = Queue::open().await;
     let mut jobs = Vec::new();
     for owner in ["a", "a", "a", "b", "b"] {
@@ -393,7 +393,7 @@ async fn owners_take_turns_job_by_job() {
 }
 
 #[tokio::test]
-async fn no_more_jobs_are_queued_or_running_than_the_quota_allows() {
+async fn quota_limits_queued_and_running_jobs() {
     let queue = Queue::open().await;
     let charge = async || queue.charge(of("a", 2), None, 0).await;
     charge().await.unwrap();

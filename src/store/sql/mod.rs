@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn the_one_writer_needs_no_row_locks() {
+    fn row_locks_are_removed_for_sqlite() {
         let of = |sql: &'static str| without_row_locks(sql.into());
         assert_eq!(of("select 1 from jobs for update"), "select 1 from jobs");
         assert_eq!(

@@ -18,8 +18,8 @@ use sqlx::{Connection, Executor, PgPool, Postgres, Sqlite, SqlitePool};
 use super::{query, query_scalar};
 use crate::store::Error;
 
-static FOR_SQLITE: Migrator = sqlx::migrate!("migrations/sqlite");
-static FOR_POSTGRES: Migrator = sqlx::migrate!("migrations/postgres");
+static SQLITE_MIGRATIONS: Migrator = sqlx::migrate!("migrations/sqlite");
+static POSTGRES_MIGRATIONS: Migrator = sqlx::migrate!("migrations/postgres");
 /// Number of reader connections of one process. Free choice.
 const SQLITE_READERS: u32 = 4;
 /// Number of connections of one process. Many processes share the server's limit, which is usually 100.
@@ -28,7 +28,7 @@ const POSTGRES_CONNECTIONS: u32 = 8;
 /// Error code of PostgreSQL: the database does not exist.
 const NO_SUCH_DATABASE: &str = "3D000";
 /// Error code of PostgreSQL: the database exists already.
-const DATABASE_IS_THERE: &str = "42P04";
+const DATABASE_EXISTS: &str = "42P04";
 
 /// The connections to a database.
 #[derive(Clone, Debug)]
@@ -72,7 +72,7 @@ impl Pool {
             .connect_with(options.clone())
             .await?;
         if migrates {
-            FOR_SQLITE.run(&writer).await?;
+            SQLITE_MIGRATIONS.run(&writer).await?;
         }
         let readers = pool
             .max_connections(SQLITE_READERS)
@@ -95,7 +95,7 @@ impl Pool {
             }
             opened => opened?,
         };
-        FOR_POSTGRES.run(&pool).await?;
+        POSTGRES_MIGRATIONS.run(&pool).await?;
         Ok(Pool::Postgres(pool))
     }
 
@@ -187,7 +187,7 @@ fn options(file: &Path) -> SqliteConnectOptions {
 /// Creates the database. Succeeds also if another process has created it.
 async fn create(url: &str) -> Result<(), sqlx::Error> {
     match Postgres::create_database(url).await {
-        Err(sqlx::Error::Database(error)) if error.code().as_deref() == Some(DATABASE_IS_THERE) => {
+        Err(sqlx::Error::Database(error)) if error.code().as_deref() == Some(DATABASE_EXISTS) => {
             Ok(())
         }
         made => made,
@@ -196,7 +196,7 @@ async fn create(url: &str) -> Result<(), sqlx::Error> {
 
 impl Listener {
     /// Waits for the next notification. Never returns on SQLite.
-    pub(in crate::store) async fn heard(&mut self) -> Result<(), sqlx::Error> {
+    pub(in crate::store) async fn next(&mut self) -> Result<(), sqlx::Error> {
         match &mut self.0 {
             Some(listener) => listener.recv().await.map(drop),
             None => std::future::pending().await,
@@ -272,7 +272,7 @@ mod tests {
     use crate::code::Code;
 
     #[tokio::test]
-    async fn a_connection_whose_transaction_sqlite_ended_is_opened_again() {
+    async fn connection_after_a_rollback_by_sqlite_is_replaced() {
         let data = tempfile::tempdir().unwrap();
         let file = data.path().join("rows.db");
         let [writer, _] = Pool::open_sqlite(&file, true).await.unwrap();
@@ -316,10 +316,13 @@ mod tests {
             x'00000000000000000000000000000003', '{}', '{}', 0, 8);";
 
     #[tokio::test]
-    async fn jobs_of_an_older_version_stay_with_all_that_refers_to_them() {
+    async fn migration_keeps_jobs_of_older_versions_and_their_references() {
         let data = tempfile::tempdir().unwrap();
         let file = data.path().join("rows.db");
-        let older = FOR_SQLITE.iter().filter(|one| one.version < 12).cloned();
+        let older = SQLITE_MIGRATIONS
+            .iter()
+            .filter(|one| one.version < 12)
+            .cloned();
         let older = Migrator {
             migrations: Cow::Owned(older.collect()),
             ..Migrator::DEFAULT

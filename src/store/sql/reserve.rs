@@ -23,11 +23,11 @@ const BLOCK_BYTES: u64 = 4096;
 
 /// The reserve of one database. Clones share it.
 #[derive(Clone, Debug)]
-pub(in crate::store) struct Reserve(Option<Arc<Kept>>);
+pub(in crate::store) struct Reserve(Option<Arc<ReserveFile>>);
 
 #[derive(Debug)]
-struct Kept {
-    file: PathBuf,
+struct ReserveFile {
+    path: PathBuf,
     /// Held while the space is released for use, and while the file is made complete.
     lent: Mutex<()>,
 }
@@ -35,8 +35,8 @@ struct Kept {
 impl Reserve {
     /// Returns the reserve of a database file. The file is made by the first [`Reserve::require`].
     pub(in crate::store) fn beside(database: &Path) -> Reserve {
-        Reserve(Some(Arc::new(Kept {
-            file: database.with_extension("reserve"),
+        Reserve(Some(Arc::new(ReserveFile {
+            path: database.with_extension("reserve"),
             lent: Mutex::new(()),
         })))
     }
@@ -50,9 +50,9 @@ impl Reserve {
     /// [`ErrorKind::StorageFull`] otherwise.
     pub(in crate::store) async fn require(&self) -> io::Result<()> {
         match &self.0 {
-            Some(kept) if !kept.is_whole() => {
-                let _lent = kept.lent.lock().await;
-                kept.make().await
+            Some(file) if !file.is_complete() => {
+                let _lent = file.lent.lock().await;
+                file.complete().await
             }
             _ => Ok(()),
         }
@@ -70,53 +70,53 @@ impl Reserve {
             Err(error) if error.code() == Code::StorageFull => error,
             ended => return ended,
         };
-        let Some(kept) = &self.0 else {
+        let Some(file) = &self.0 else {
             return Err(full);
         };
-        let _lent = kept.lent.lock().await;
-        kept.give()?;
+        let _lent = file.lent.lock().await;
+        file.remove()?;
         let ended = work().await;
-        if let Err(error) = kept.make().await {
+        if let Err(error) = file.complete().await {
             tracing::warn!(%error, "the disk is full: new data is refused until space is free");
         }
         ended
     }
 }
 
-impl Kept {
-    fn is_whole(&self) -> bool {
-        fs::metadata(&self.file).is_ok_and(|file| file.len() >= RESERVE_BYTES)
+impl ReserveFile {
+    fn is_complete(&self) -> bool {
+        fs::metadata(&self.path).is_ok_and(|file| file.len() >= RESERVE_BYTES)
     }
 
-    fn give(&self) -> io::Result<()> {
-        match fs::remove_file(&self.file) {
+    fn remove(&self) -> io::Result<()> {
+        match fs::remove_file(&self.path) {
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-            given => given,
+            removed => removed,
         }
     }
 
     /// Makes the file complete. If there is too little space, fails, and the file takes the space that there
     /// is.
-    async fn make(&self) -> io::Result<()> {
-        if self.is_whole() {
+    async fn complete(&self) -> io::Result<()> {
+        if self.is_complete() {
             return Ok(());
         }
-        let path = self.file.clone();
-        let make = move || {
+        let path = self.path.clone();
+        let complete = move || {
             let mut file = File::options();
             let file = file.create(true).truncate(false).write(true).open(path)?;
-            grow(&file, RESERVE_BYTES).inspect_err(|_| {
+            allocate(&file, RESERVE_BYTES).inspect_err(|_| {
                 // A smaller reserve still serves for a few deletions. Failure is ignored: the first error is
                 // reported anyway.
-                take_rest(&file).ok();
+                allocate_rest(&file).ok();
             })
         };
-        spawn_blocking(make).await.map_err(io::Error::other)?
+        spawn_blocking(complete).await.map_err(io::Error::other)?
     }
 }
 
 /// Allocates the first `n_bytes` of the file. Part of them may be allocated already.
-fn grow(mut file: &File, n_bytes: u64) -> io::Result<()> {
+fn allocate(mut file: &File, n_bytes: u64) -> io::Result<()> {
     match fallocate(file, FallocateFlags::empty(), 0, n_bytes) {
         // The file system cannot allocate in advance, so zeros are written.
         Err(Errno::OPNOTSUPP) => {
@@ -131,13 +131,13 @@ fn grow(mut file: &File, n_bytes: u64) -> io::Result<()> {
 }
 
 /// Allocates the remaining space of the disk to the file, in whole blocks, up to the size of the reserve.
-fn take_rest(file: &File) -> io::Result<()> {
+fn allocate_rest(file: &File) -> io::Result<()> {
     let disk = rustix::fs::fstatvfs(file)?;
     let n_free = disk.f_bavail.saturating_mul(disk.f_frsize);
     let n_bytes = (file.metadata()?.len() + n_free).min(RESERVE_BYTES) / BLOCK_BYTES * BLOCK_BYTES;
     match n_bytes {
         0 => Ok(()),
-        _ => grow(file, n_bytes),
+        _ => allocate(file, n_bytes),
     }
 }
 
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn room_is_lent_to_the_second_run_and_taken_back() {
+    async fn reserve_is_released_for_the_second_run_and_restored() {
         let data = tempfile::tempdir().unwrap();
         let reserve = Reserve::beside(&data.path().join("rows.db"));
         reserve.require().await.unwrap();
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn work_that_fails_for_another_reason_runs_once_and_keeps_the_reserve() {
+    async fn other_failures_run_once_and_keep_the_reserve() {
         let data = tempfile::tempdir().unwrap();
         let reserve = Reserve::beside(&data.path().join("rows.db"));
         reserve.require().await.unwrap();
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn what_needs_the_reserve_waits_while_it_is_lent() {
+    async fn require_waits_while_the_reserve_is_lent() {
         let data = tempfile::tempdir().unwrap();
         let reserve = Reserve::beside(&data.path().join("rows.db"));
         reserve.require().await.unwrap();

@@ -42,86 +42,30 @@ where
     Ok(arguments)
 }
 
-impl From<i64> for Value {
-    fn from(value: i64) -> Value {
-        Value::Integer(Some(value))
-    }
+/// Implements `From` for types of parameters.
+macro_rules! from {
+    ($($type:ty => |$value:ident| $parameter:expr;)*) => {$(
+        impl From<$type> for Value {
+            fn from($value: $type) -> Value {
+                $parameter
+            }
+        }
+    )*};
 }
 
-impl From<Option<i64>> for Value {
-    fn from(value: Option<i64>) -> Value {
-        Value::Integer(value)
-    }
-}
-
-impl From<f64> for Value {
-    fn from(value: f64) -> Value {
-        Value::Real(value)
-    }
-}
-
-impl From<bool> for Value {
-    fn from(value: bool) -> Value {
-        Value::Boolean(value)
-    }
-}
-
-impl From<&str> for Value {
-    fn from(value: &str) -> Value {
-        Value::Text(Some(value.to_owned()))
-    }
-}
-
-impl From<Option<&str>> for Value {
-    fn from(value: Option<&str>) -> Value {
-        Value::Text(value.map(str::to_owned))
-    }
-}
-
-impl From<String> for Value {
-    fn from(value: String) -> Value {
-        Value::Text(Some(value))
-    }
-}
-
-impl From<&String> for Value {
-    fn from(value: &String) -> Value {
-        Value::from(value.as_str())
-    }
-}
-
-impl From<&Owner> for Value {
-    fn from(Owner(name): &Owner) -> Value {
-        Value::from(name)
-    }
-}
-
-impl From<&[u8]> for Value {
-    fn from(value: &[u8]) -> Value {
-        Value::Bytes(Some(value.to_vec()))
-    }
-}
-
-impl From<Option<&[u8]>> for Value {
-    fn from(value: Option<&[u8]>) -> Value {
-        Value::Bytes(value.map(<[u8]>::to_vec))
-    }
-}
-
-impl From<&Vec<u8>> for Value {
-    fn from(value: &Vec<u8>) -> Value {
-        Value::from(value.as_slice())
-    }
-}
-
-impl From<Uuid> for Value {
-    fn from(value: Uuid) -> Value {
-        Value::Uuid(Some(value))
-    }
-}
-
-impl From<Option<Uuid>> for Value {
-    fn from(value: Option<Uuid>) -> Value {
-        Value::Uuid(value)
-    }
+from! {
+    i64 => |value| Value::Integer(Some(value));
+    Option<i64> => |value| Value::Integer(value);
+    f64 => |value| Value::Real(value);
+    bool => |value| Value::Boolean(value);
+    &str => |value| Value::Text(Some(value.to_owned()));
+    Option<&str> => |value| Value::Text(value.map(str::to_owned));
+    String => |value| Value::Text(Some(value));
+    &String => |value| Value::Text(Some(value.clone()));
+    &Owner => |value| Value::Text(Some(value.0.clone()));
+    &[u8] => |value| Value::Bytes(Some(value.to_vec()));
+    Option<&[u8]> => |value| Value::Bytes(value.map(<[u8]>::to_vec));
+    &Vec<u8> => |value| Value::Bytes(Some(value.clone()));
+    Uuid => |value| Value::Uuid(Some(value));
+    Option<Uuid> => |value| Value::Uuid(value);
 }

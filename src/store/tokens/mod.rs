@@ -107,7 +107,7 @@ impl Store {
             scope = token.scope.name(),
             "token made"
         );
-        let text = secret::written(&token.id, &secret.text);
+        let text = secret::token_text(&token.id, &secret.text);
         Ok((token, text))
     }
 
@@ -148,13 +148,13 @@ impl Store {
             .await?;
         let right = row.filter(|row| secret::is_same(&row.sha256, &given.sha256));
         let token = right.map(Token::try_from).transpose()?;
-        Ok(token.filter(|token| token.is_good(now_ms)))
+        Ok(token.filter(|token| token.is_valid(now_ms)))
     }
 }
 
 impl Token {
     /// Returns whether the token is neither expired nor revoked.
-    pub fn is_good(&self, now_ms: i64) -> bool {
+    pub fn is_valid(&self, now_ms: i64) -> bool {
         self.revoked_ms.is_none() && self.expires_ms.is_none_or(|end_ms| end_ms > now_ms)
     }
 
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn a_token_is_good_until_it_ends_or_is_revoked() {
+    async fn token_is_valid_until_it_expires_or_is_revoked() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         assert!(!store.has_tokens(0).await.unwrap());
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn another_secret_or_another_id_is_no_token() {
+    async fn token_with_another_secret_or_id_is_refused() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let (_, first) = store.add_token(&wanted(None), 0).await.unwrap();
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn the_folder_holds_no_secret() {
+    async fn data_folder_contains_no_secret() {
         let data = tempfile::tempdir().unwrap();
         let store = Store::open(data.path()).await.unwrap();
         let (_, text) = store.add_token(&wanted(None), 0).await.unwrap();

@@ -40,10 +40,10 @@ impl Presented {
             .strip_prefix(PREFIX)?
             .strip_prefix('_')?
             .split_once('_')?;
-        let is_ours = |part: &str, n: usize| {
+        let is_part = |part: &str, n: usize| {
             part.len() == n && part.bytes().all(|byte| byte.is_ascii_alphanumeric())
         };
-        let is_token = is_ours(id, ID_LETTERS) && is_ours(secret, SECRET_LETTERS);
+        let is_token = is_part(id, ID_LETTERS) && is_part(secret, SECRET_LETTERS);
         is_token.then(|| Presented {
             id: id.to_owned(),
             sha256: hash(secret),
@@ -65,14 +65,14 @@ impl Secret {
 /// Creates the public id of a token.
 pub(super) fn random_id() -> io::Result<String> {
     let mut bytes = [0; ID_BYTES];
-    fill(&mut bytes)?;
+    fill_random(&mut bytes)?;
     Ok(base62(&bytes, ID_LETTERS))
 }
 
 /// Returns 32 bytes of the system's random generator.
 pub(in crate::store) fn random_key() -> io::Result<[u8; 32]> {
     let mut bytes = [0; 32];
-    fill(&mut bytes)?;
+    fill_random(&mut bytes)?;
     Ok(bytes)
 }
 
@@ -89,7 +89,7 @@ pub fn hmac_sha256(key: &[u8], message: &[u8]) -> [u8; 32] {
 }
 
 /// Returns the text of a token, made of its id and its secret.
-pub(super) fn written(id: &str, secret: &str) -> String {
+pub(super) fn token_text(id: &str, secret: &str) -> String {
     format!("{PREFIX}_{id}_{secret}")
 }
 
@@ -107,7 +107,7 @@ pub fn is_same(a: &[u8], b: &[u8]) -> bool {
     a.len() == b.len() && differing == 0
 }
 
-fn fill(bytes: &mut [u8]) -> io::Result<()> {
+fn fill_random(bytes: &mut [u8]) -> io::Result<()> {
     getrandom::fill(bytes).map_err(|error| io::Error::other(error.to_string()))
 }
 
@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_are_written_as_a_number_of_base_62() {
+    fn base62_writes_bytes_as_a_number() {
         assert_eq!(base62(&[0], 2), "00");
         assert_eq!(base62(&[61], 2), "0z");
         assert_eq!(base62(&[1, 0], 3), "048");
@@ -141,9 +141,9 @@ mod tests {
     }
 
     #[test]
-    fn a_token_is_read_as_it_was_written_and_nothing_else_is_one() {
+    fn only_written_tokens_are_parsed() {
         let (id, secret) = (random_id().unwrap(), Secret::random().unwrap());
-        let token = written(&id, &secret.text);
+        let token = token_text(&id, &secret.text);
         let read = Presented::parse(&token).unwrap();
         assert!(read.id == id && read.sha256 == secret.sha256);
         for other in [
@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn the_keyed_hash_is_that_of_rfc_4231() {
+    fn hmac_matches_rfc_4231() {
         let hash = hmac_sha256(b"Jefe", b"what do ya want for nothing?");
         let hash: String = hash.iter().map(|byte| format!("{byte:02x}")).collect();
         let wanted = "5bdcc146bf60754e6a042426089575c75a003f089d2739839dec58b964ec3843";
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn hashes_differ_where_any_byte_does() {
+    fn comparison_finds_a_difference_in_any_byte() {
         let hash = hash("x");
         assert!(is_same(&hash, &hash));
         for index in 0..32 {

@@ -50,7 +50,7 @@ impl Store {
         .fetch_optional(&self.reader)
         .await?;
         let token = row.map(Token::try_from).transpose()?;
-        Ok(token.filter(|token| token.is_good(now_ms)))
+        Ok(token.filter(|token| token.is_valid(now_ms)))
     }
 
     /// Ends a session. Succeeds also if the session does not exist.

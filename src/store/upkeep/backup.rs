@@ -20,7 +20,7 @@ const DATABASE: &str = "flockreel.db";
 
 /// Result of a backup.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Copied {
+pub struct BackupSize {
     /// Number of copied files, including unfinished uploads.
     pub n_files: usize,
     /// Total size of the copied files, bytes.
@@ -33,15 +33,15 @@ impl Store {
     ///
     /// Fails if the database is on a server, if a stored file is damaged, or if files are deleted faster than
     /// they are copied.
-    pub async fn back_up(&self, target: &Path) -> Result<Copied, Error> {
-        let partial = beside(target);
+    pub async fn back_up(&self, target: &Path) -> Result<BackupSize, Error> {
+        let partial = partial_path(target);
         fs::create_dir_all(&partial)?;
-        let mut copied = Copied::default();
+        let mut copied = BackupSize::default();
         for _ in 0..MAX_ROUNDS {
             let snapshot = self.copy_rows(&partial.join(DATABASE)).await?;
-            let is_whole = self.copy_files(&snapshot, &partial, &mut copied).await?;
-            if is_whole {
-                forget_workers(&snapshot).await?;
+            let is_complete = self.copy_files(&snapshot, &partial, &mut copied).await?;
+            if is_complete {
+                requeue_running_jobs(&snapshot).await?;
                 snapshot.close().await;
                 return publish(&partial, target)
                     .map(|()| copied)
@@ -66,7 +66,7 @@ impl Store {
         &self,
         snapshot: &Pool,
         partial: &Path,
-        copied: &mut Copied,
+        copied: &mut BackupSize,
     ) -> Result<bool, Error> {
         let sql = "select folder, name, size_bytes, sha256 from blobs order by folder, name";
         let rows: Vec<(String, String, i64, Vec<u8>)> = sql::query(sql).fetch_all(snapshot).await?;
@@ -80,7 +80,7 @@ impl Store {
             if place.join(&file.name).exists() {
                 continue;
             }
-            if !self.copy(&folder, &file, &place).await? {
+            if !self.copy_file(&folder, &file, &place).await? {
                 return Ok(false);
             }
             copied.n_files += 1;
@@ -90,7 +90,7 @@ impl Store {
         let uploads: Vec<(Uuid, i64)> = sql::query(sql).fetch_all(snapshot).await?;
         for (id, offset_bytes) in uploads {
             let to = partial.join("uploads");
-            let Some(n_bytes) = copy_start(&self.upload_path(id), &to, offset_bytes)? else {
+            let Some(n_bytes) = copy_prefix(&self.upload_path(id), &to, offset_bytes)? else {
                 return Ok(false);
             };
             copied.n_files += 1;
@@ -104,13 +104,13 @@ impl Store {
     ///
     /// The copy gets its final name only when it is complete, so that the next backup does not keep a partial
     /// one.
-    async fn copy(&self, folder: &str, file: &BlobFile, to: &Path) -> Result<bool, Error> {
+    async fn copy_file(&self, folder: &str, file: &BlobFile, to: &Path) -> Result<bool, Error> {
         fs::create_dir_all(to)?;
-        let unproven = to.join(format!("{}.unproven", file.name));
-        let mut target = tokio::fs::File::create(&unproven).await?;
+        let unverified = to.join(format!("{}.unverified", file.name));
+        let mut target = tokio::fs::File::create(&unverified).await?;
         match self.blobs.copy(file, folder, &mut target).await {
             Err(Error::Io(error)) if error.kind() == io::ErrorKind::NotFound => {
-                fs::remove_file(&unproven)?;
+                fs::remove_file(&unverified)?;
                 return Ok(false);
             }
             Ok(found) if found == (file.size_bytes, file.sha256.clone()) => {}
@@ -124,13 +124,13 @@ impl Store {
             Err(error) => return Err(error),
         }
         target.sync_all().await?;
-        fs::rename(&unproven, to.join(&file.name))?;
+        fs::rename(&unverified, to.join(&file.name))?;
         Ok(true)
     }
 }
 
 /// Returns the folder of the unfinished copy.
-fn beside(target: &Path) -> PathBuf {
+fn partial_path(target: &Path) -> PathBuf {
     let mut name = target.file_name().unwrap_or_default().to_owned();
     name.push(".partial");
     target.with_file_name(name)
@@ -138,7 +138,7 @@ fn beside(target: &Path) -> PathBuf {
 
 /// Copies the synced bytes of an unfinished upload; later bytes may still change. Returns the number of
 /// bytes, or `None` if the file is missing or too short.
-fn copy_start(from: &Path, folder: &Path, n_bytes: i64) -> io::Result<Option<u64>> {
+fn copy_prefix(from: &Path, folder: &Path, n_bytes: i64) -> io::Result<Option<u64>> {
     let source = match File::open(from) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         source => source?,
@@ -151,7 +151,7 @@ fn copy_start(from: &Path, folder: &Path, n_bytes: i64) -> io::Result<Option<u64
 }
 
 /// Returns running jobs to the queue, as a release does.
-async fn forget_workers(snapshot: &Pool) -> Result<(), Error> {
+async fn requeue_running_jobs(snapshot: &Pool) -> Result<(), Error> {
     sql::query(
         "update jobs set state = 'queued', worker = null, lease_until_ms = null, stage = null, \
          progress = 0, attempt = attempt - 1 where state = 'running'",
@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn a_backup_after_one_that_was_cut_short_is_whole() {
+    async fn backup_after_an_interrupted_one_is_complete() {
         let data = tempfile::tempdir().unwrap();
         let store = Store::open(data.path()).await.unwrap();
         let draft = store.blobs().draft("film").unwrap();
@@ -201,7 +201,7 @@ mod tests {
             .await
             .unwrap();
         let target = data.path().join("copy");
-        let partial = beside(&target).join("blobs/footage/a");
+        let partial = partial_path(&target).join("blobs/footage/a");
         let begun = async {
             let has_bytes = |entry: fs::DirEntry| entry.metadata().is_ok_and(|file| file.len() > 0);
             while !fs::read_dir(&partial).is_ok_and(|mut all| all.any(|e| e.is_ok_and(has_bytes))) {

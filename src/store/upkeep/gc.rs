@@ -4,7 +4,7 @@
 use std::fs;
 use std::time::SystemTime;
 
-use crate::store::idempotency::KEPT_MS;
+use crate::store::idempotency::ANSWER_LIFETIME_MS;
 use crate::store::{Error, Store, sql};
 
 /// Amount of removable data.
@@ -46,7 +46,7 @@ impl Store {
             ),
             (
                 "select count(*) from idempotency where created_ms <= $1",
-                now_ms - KEPT_MS,
+                now_ms - ANSWER_LIFETIME_MS,
             ),
         ] {
             let count: i64 = sql::query_scalar(sql)
@@ -70,7 +70,7 @@ impl Store {
             ("delete from sessions where expires_ms <= $1", now_ms),
             (
                 "delete from idempotency where created_ms <= $1",
-                now_ms - KEPT_MS,
+                now_ms - ANSWER_LIFETIME_MS,
             ),
         ] {
             let delete = || async {
@@ -92,7 +92,7 @@ mod tests {
     use crate::store::{blobs, fresh};
 
     #[tokio::test]
-    async fn what_nobody_refers_to_is_counted_and_then_removed() {
+    async fn unreferenced_data_is_counted_and_removed() {
         let data = tempfile::tempdir().unwrap();
         let store = Store::open(data.path()).await.unwrap();
         for folder in ["tmp/draft", "blobs/flocks/folder.1"] {
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn what_a_row_names_is_kept_however_old() {
+    async fn old_folders_with_rows_are_kept() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let draft = store.blobs().draft("film").unwrap();
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn beside_a_service_its_drafts_are_left_alone() {
+    async fn drafts_of_a_running_service_are_kept() {
         let data = tempfile::tempdir().unwrap();
         let service = Store::open(data.path()).await.unwrap();
         let draft = service.blobs().draft("under way").unwrap();

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use flockreel::jobs::clock::now_ms;
 use flockreel::jobs::supervisor::Supervisor;
-use flockreel::store::idempotency::{Answer, Begun, KEPT_MS, Scope};
+use flockreel::store::idempotency::{ANSWER_LIFETIME_MS, Answer, Begun, Scope};
 use flockreel::store::owners::Owner;
 use flockreel::store::uploads::Upload;
 use uuid::Uuid;
@@ -22,7 +22,10 @@ async fn a_running_service_removes_what_has_expired_and_nothing_else() {
     begin_upload(&app, now_ms() - 1).await;
     begin_upload(&app, now_ms() + 60_000).await;
     let (old, young) = (key("old"), key("young"));
-    for (scope, then_ms) in [(&old, now_ms() - KEPT_MS), (&young, now_ms() - 1000)] {
+    for (scope, then_ms) in [
+        (&old, now_ms() - ANSWER_LIFETIME_MS),
+        (&young, now_ms() - 1000),
+    ] {
         answer_key(&app, scope, then_ms).await;
     }
     // Folders in a bucket cannot be backdated, so strays are tested in local storage only.
@@ -42,7 +45,7 @@ async fn a_running_service_removes_what_has_expired_and_nothing_else() {
     assert_eq!(app.n_uploads(), 1);
     // Look the keys up as of a time at which neither has expired: only the young one is still stored.
     let store = &app.context.store;
-    let then_ms = now_ms() - KEPT_MS;
+    let then_ms = now_ms() - ANSWER_LIFETIME_MS;
     let met = store.begin_key(&old, None, then_ms).await.unwrap();
     assert!(matches!(met, Begun::Run(_)), "{met:?}");
     let met = store.begin_key(&young, None, then_ms).await.unwrap();
