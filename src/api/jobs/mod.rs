@@ -35,8 +35,7 @@ pub(super) struct JobView {
     kind: &'static str,
     /// `queued`, `running`, `done`, `failed` or `cancelled`.
     state: &'static str,
-    /// Current stage, such as `tracking`. After a failure or cancellation, the last stage. null before the
-    /// first stage and when the job is done.
+    /// Current stage, such as `tracking`. null before the first stage and after the job has ended.
     stage: Option<String>,
     /// Progress of the whole job, 0..=1.
     progress: f64,

@@ -305,6 +305,33 @@ async fn follower_of_a_failed_job_fails() {
 }
 
 #[tokio::test]
+async fn ended_job_has_no_stage() {
+    let queue = Queue::open().await;
+    let running = async || {
+        queue.enqueue(None).await;
+        let lease = queue.claim(0).await.unwrap();
+        let beat = queue.store.heartbeat(&lease, i64::MAX, "tracking", 0.5);
+        assert_eq!(beat.await.unwrap(), Beat::Held);
+        lease
+    };
+    let stage = async |lease: &Lease| {
+        let row = queue.store.job(lease.job_id, &OwnerFilter::All).await;
+        row.unwrap().unwrap().stage
+    };
+    let done = running().await;
+    assert_eq!(stage(&done).await.as_deref(), Some("tracking"));
+    assert_eq!(queue.finish(&done).await, Change::Made);
+    assert_eq!(stage(&done).await, None);
+    let failed = running().await;
+    let failure = queue.store.fail(&failed, Code::Internal, "", None, 1);
+    assert_eq!(failure.await.unwrap(), Change::Made);
+    assert_eq!(stage(&failed).await, None, "failed");
+    let stopped = running().await;
+    assert_eq!(queue.store.stop(&stopped, 1).await.unwrap(), Change::Made);
+    assert_eq!(stage(&stopped).await, None, "cancelled");
+}
+
+#[tokio::test]
 async fn concurrent_claims_give_each_job_to_one_worker() {
     let queue = Queue::open().await;
     for _ in 0..100 {
