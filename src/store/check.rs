@@ -96,9 +96,9 @@ impl Store {
                 size_bytes,
                 sha256,
             };
-            match self.blobs.hash(&file, &folder).await {
-                Ok(found) if found == (file.size_bytes, file.sha256) => {}
-                Ok(_) => faults.push(format!("I1: altered: {folder}/{}", file.name)),
+            match self.blobs.is_intact(&file, &folder).await {
+                Ok(true) => {}
+                Ok(false) => faults.push(format!("I1: altered: {folder}/{}", file.name)),
                 Err(error) => faults.push(format!("I1: {error}: {folder}/{}", file.name)),
             }
         }
@@ -131,3 +131,31 @@ const WRONG_SIZES: &str = "select r.folder from ( \
          select folder, size_bytes from fish) r \
          where r.size_bytes != ( \
          select coalesce(sum(b.size_bytes), -1) from blobs b where b.folder = r.folder)";
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+    use crate::store::blobs;
+
+    #[tokio::test]
+    async fn bytes_appended_to_a_stored_file_are_reported() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        let draft = store.blobs().draft("film").unwrap();
+        fs::write(draft.path().join("video"), b"12345").unwrap();
+        let files = store.blobs().seal(&draft).unwrap();
+        store.blobs().adopt(draft, "footage/a").await.unwrap();
+        let mut transaction = store.begin().await.unwrap();
+        let added = blobs::insert(&mut transaction, "footage/a", &files);
+        added.await.unwrap();
+        transaction.commit().await.unwrap();
+        assert_eq!(store.check(0).await.unwrap(), Vec::<Fault>::new());
+        let path = data.path().join("blobs/footage/a/video");
+        let mut file = fs::File::options().append(true).open(path).unwrap();
+        file.write_all(b"6").unwrap();
+        let faults = store.check(0).await.unwrap();
+        assert_eq!(faults, ["I1: altered: footage/a/video"]);
+    }
+}

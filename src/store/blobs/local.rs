@@ -61,6 +61,11 @@ impl LocalFolder {
         Ok(spawn_blocking(discard).await.map_err(io::Error::other)??)
     }
 
+    pub(super) async fn size_bytes(&self, folder: &str, name: &str) -> io::Result<u64> {
+        let file = tokio::fs::metadata(self.folder(folder).join(name));
+        Ok(file.await?.len())
+    }
+
     pub(super) async fn read(
         &self,
         folder: &str,
