@@ -307,6 +307,20 @@ pub(super) fn label(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::label;
+    use crate::api::table;
+
+    #[test]
+    fn forms_with_footage_declare_every_file_that_is_accepted() {
+        let (_, document) = table().split_for_parts();
+        let document = serde_json::to_value(document).unwrap();
+        for form in ["FootageForm", "AnalysisForm", "FlockForm"] {
+            let fields = &document["components"]["schemas"][form]["properties"];
+            for name in ["background", "masks"] {
+                assert!(fields[name].is_object(), "{form} lacks {name}");
+            }
+        }
+    }
+
     #[test]
     fn label_has_no_folders_and_no_control_characters() {
         assert_eq!(label("../../etc/passwd"), "passwd");
