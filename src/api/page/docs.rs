@@ -85,10 +85,13 @@ fn errors() -> String {
 }
 
 fn entry(code: Code) -> String {
+    let status = status_of(code);
+    // Status 460 of the tus protocol has no name in HTTP.
+    let reason = status.canonical_reason().unwrap_or("Checksum Mismatch");
     format!(
-        "<dt id=\"{code}\"><a href=\"#{code}\"><code>{code}</code></a> <small>{}</small></dt>\n\
+        "<dt id=\"{code}\"><a href=\"#{code}\"><code>{code}</code></a> <small>{} {reason}</small></dt>\n\
          <dd>{}</dd>\n<dd class=\"soft\">{}</dd>\n",
-        status_of(code),
+        status.as_str(),
         marked(code.meaning()),
         marked(code.advice()),
     )
@@ -124,6 +127,14 @@ mod tests {
     #[test]
     fn text_is_escaped_and_code_is_marked() {
         assert_eq!(marked("a < b & `c`."), "a &lt; b &amp; <code>c</code>.");
+    }
+
+    #[test]
+    fn every_status_has_a_reason() {
+        for &code in Code::ALL {
+            assert!(!entry(code).contains("unknown status"), "{code}");
+        }
+        assert!(entry(Code::ChecksumMismatch).contains("460 Checksum Mismatch"));
     }
 
     #[test]
