@@ -7,6 +7,9 @@ use crate::common::TestApp;
 use crate::common::app::{code_of, json_of};
 use crate::common::clip::TINY;
 use crate::common::film::Films;
+use flockreel::code::Code;
+use flockreel::jobs::worker::{Step, Worker};
+use flockreel::media;
 use flockreel::store::tokens::Scope;
 
 async fn queued(app: &TestApp) -> Value {
@@ -84,6 +87,38 @@ async fn a_queued_job_is_cancelled_once() {
     assert_eq!(cancelled["state"], "cancelled");
     let again = app.delete(&path).send().await.unwrap();
     assert_eq!(code_of(again, 409).await, "already_finished");
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn result_that_never_comes_is_answered_with_the_reason_and_the_job() {
+    let app = TestApp::idle().await;
+    let failed = queued(&app).await;
+    let worker = Worker::new(app.context.clone());
+    let step = worker.step_by(|_, _| Err(media::Error::NoVideoStream.into()));
+    assert!(matches!(
+        step.await.unwrap(),
+        Step::Failed(_, Code::NoVideoStream)
+    ));
+    let cancelled = queued(&app).await;
+    let job = format!("/v1/jobs/{}", cancelled["job_id"].as_str().unwrap());
+    app.delete(&job).send().await.unwrap();
+    for (accepted, code) in [(failed, "no_video_stream"), (cancelled, "cancelled")] {
+        let id = |name: &str| accepted[name].as_str().unwrap().to_owned();
+        let job = format!("/v1/jobs/{}", id("job_id"));
+        for path in ["", "/library.json"] {
+            let path = format!("/v1/libraries/{}{path}", id("library_id"));
+            let answer = app.get(&path).send().await.unwrap();
+            assert_eq!(
+                answer.headers()["link"],
+                format!("<{job}>; rel=\"related\"")
+            );
+            assert!(!answer.headers().contains_key("retry-after"));
+            let problem = json_of(answer, StatusCode::NOT_FOUND).await;
+            assert_eq!(problem["code"], code);
+            assert!(problem["detail"].as_str().unwrap().contains(&job));
+        }
+    }
     app.assert_sound().await;
 }
 
