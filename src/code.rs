@@ -128,7 +128,7 @@ codes! {
     // The API.
     NotFound "not_found" "No resource exists at this address."
         "Check the address. The object may have been deleted, or may belong to another owner."
-    NotReady "not_ready" "The result does not exist: its job has not finished, or it failed or was cancelled."
+    NotReady "not_ready" "The result does not exist yet: its job has not finished."
         "Wait for the job in `detail`, through its events or with `Prefer: wait=60`."
     MethodNotAllowed "method_not_allowed" "The method is not allowed for this address."
         "The `Allow` header of the response lists the allowed methods."

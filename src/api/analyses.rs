@@ -68,12 +68,16 @@ pub(super) struct AnalysisAccepted {
     reason = "it only describes the form in the OpenAPI document"
 )]
 pub(super) struct AnalysisForm {
-    /// Video, zip of numbered pictures, or TIFF of several pages.
+    /// Video, zip of numbered pictures, or TIFF of several pages. The field may also be called `footage`.
     #[schema(value_type = String, format = Binary)]
     video: Vec<u8>,
     /// Picture of the scene without the animal, of the same width and height as the video.
     #[schema(value_type = Option<String>, format = Binary)]
     background: Option<Vec<u8>>,
+    /// One mask per frame, as a gray video, a zip of pictures or a TIFF. White is the animal, black the rest.
+    /// Gray is the share of the pixel that the animal covers.
+    #[schema(value_type = Option<String>, format = Binary)]
+    masks: Option<Vec<u8>>,
     /// Parameters to override, as JSON.
     params: Option<AnalysisOverrides>,
 }

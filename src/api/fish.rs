@@ -111,7 +111,8 @@ pub(super) async fn list_fish(access: Access, paging: Paging) -> JsonAnswer<Page
 
 /// Get one virtual fish: a summary and its parameters.
 ///
-/// Fails with `not_ready` if its job is not done. The message names the job and its state.
+/// Fails with `not_ready` if its job has not ended, and with the code of the job if that failed or was
+/// cancelled. The status is 404 in all these cases. The message names the job and its state.
 #[utoipa::path(get, path = "/v1/fish/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, body = FishView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),

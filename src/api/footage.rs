@@ -64,7 +64,7 @@ pub(super) struct Naming {
     reason = "it only describes the form in the OpenAPI document"
 )]
 pub(super) struct FootageForm {
-    /// Video, zip of numbered pictures, or TIFF of several pages.
+    /// Video, zip of numbered pictures, or TIFF of several pages. The field may also be called `footage`.
     #[schema(value_type = String, format = Binary)]
     video: Vec<u8>,
     /// Picture of the scene without the animal, of the same width and height as the video.

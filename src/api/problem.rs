@@ -7,6 +7,7 @@ use utoipa::ToSchema;
 
 use crate::code::Code;
 use crate::formats::params;
+use crate::ids::JobId;
 use crate::{jobs, store};
 
 /// Result of a handler.
@@ -25,6 +26,8 @@ pub struct Problem {
     pub code: Code,
     /// Description of this occurrence, for people.
     pub detail: String,
+    /// Job that did not make the requested result, with `code` as its reason. The status is then 404.
+    lost_job: Option<JobId>,
 }
 
 /// Marks a response with a transient error: retrying may succeed. It is an extension of the response that
@@ -56,6 +59,23 @@ impl Problem {
         Problem {
             code,
             detail: detail.into(),
+            lost_job: None,
+        }
+    }
+
+    /// Returns the problem of a request for a result that will never exist, because its job failed or was
+    /// cancelled with this code.
+    pub(super) fn lost_result(code: Code, detail: impl Into<String>, job: JobId) -> Problem {
+        Problem {
+            lost_job: Some(job),
+            ..Problem::new(code, detail)
+        }
+    }
+
+    fn status(&self) -> StatusCode {
+        match self.lost_job {
+            Some(_) => StatusCode::NOT_FOUND,
+            None => status_of(self.code),
         }
     }
 
@@ -66,7 +86,7 @@ impl Problem {
             self.code,
             Code::TimeLimit | Code::MemoryLimit | Code::DecoderCrashed
         );
-        is_tool_limit || !status_of(self.code).is_client_error()
+        self.lost_job.is_none() && (is_tool_limit || !self.status().is_client_error())
     }
 
     /// Returns `not_found`. An id of another owner gets the same response as an unknown id.
@@ -116,7 +136,7 @@ fn from_error(code: Code, error: &dyn std::error::Error) -> Problem {
 
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
-        let status = status_of(self.code);
+        let status = self.status();
         let is_transient = self.is_transient();
         let body = ProblemBody {
             type_url: format!("/docs/errors#{}", self.code),
@@ -130,7 +150,11 @@ impl IntoResponse for Problem {
         let headers = response.headers_mut();
         let media_type = HeaderValue::from_static("application/problem+json");
         headers.insert(header::CONTENT_TYPE, media_type);
-        if matches!(
+        if let Some(job) = self.lost_job
+            && let Ok(link) = HeaderValue::from_str(&format!("</v1/jobs/{job}>; rel=\"related\""))
+        {
+            headers.insert(header::LINK, link);
+        } else if matches!(
             self.code,
             Code::Stopping
                 | Code::NotReady

@@ -23,8 +23,8 @@ pub(super) trait View: Serialize + Sized {
 }
 
 impl Access {
-    /// Returns the row of a resource. Fails with `not_ready` if its job is not done, and with `not_found` if
-    /// there is none.
+    /// Returns the row of a resource. Fails with `not_ready` if its job has not ended, with the code of the
+    /// job if that failed or was cancelled, and with `not_found` if there is no such job.
     pub(super) async fn find<R: Resource>(&self, id: Uuid) -> Result<R::Row, Problem> {
         let row = self.store().resource::<R>(id, &self.caller.owners);
         match row.await? {

@@ -96,9 +96,9 @@ impl Store {
                 size_bytes,
                 sha256,
             };
-            match self.blobs.hash(&file, &folder).await {
-                Ok(found) if found == (file.size_bytes, file.sha256) => {}
-                Ok(_) => faults.push(format!("I1: altered: {folder}/{}", file.name)),
+            match self.blobs.is_intact(&file, &folder).await {
+                Ok(true) => {}
+                Ok(false) => faults.push(format!("I1: altered: {folder}/{}", file.name)),
                 Err(error) => faults.push(format!("I1: {error}: {folder}/{}", file.name)),
             }
         }

@@ -72,12 +72,16 @@ pub(super) struct FlockAccepted {
     reason = "it only describes the form in the OpenAPI document"
 )]
 pub(super) struct FlockForm {
-    /// Video, zip of numbered pictures, or TIFF of several pages.
+    /// Video, zip of numbered pictures, or TIFF of several pages. The field may also be called `video`.
     #[schema(value_type = String, format = Binary)]
     footage: Vec<u8>,
     /// Picture of the scene without the animal, of the same width and height as the video.
     #[schema(value_type = Option<String>, format = Binary)]
     background: Option<Vec<u8>>,
+    /// One mask per frame, as a gray video, a zip of pictures or a TIFF. White is the animal, black the rest.
+    /// Gray is the share of the pixel that the animal covers.
+    #[schema(value_type = Option<String>, format = Binary)]
+    masks: Option<Vec<u8>>,
     /// Parameters of the flock to override, as JSON.
     params: Option<FlockOverrides>,
     /// Parameters of the analysis to override, as JSON.
@@ -130,7 +134,8 @@ pub(super) async fn list_flocks(access: Access, paging: Paging) -> JsonAnswer<Pa
 
 /// Get one flock: a summary, its parameters and advice.
 ///
-/// Fails with `not_ready` if its job is not done. The message names the job and its state.
+/// Fails with `not_ready` if its job has not ended, and with the code of the job if that failed or was
+/// cancelled. The status is 404 in all these cases. The message names the job and its state.
 #[utoipa::path(get, path = "/v1/flocks/{id}", params(("id" = Uuid, Path)), responses(
     (status = 200, body = FlockView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),

@@ -35,8 +35,7 @@ pub(super) struct JobView {
     kind: &'static str,
     /// `queued`, `running`, `done`, `failed` or `cancelled`.
     state: &'static str,
-    /// Current stage, such as `tracking`. After a failure or cancellation, the last stage. null before the
-    /// first stage and when the job is done.
+    /// Current stage, such as `tracking`. null before the first stage and after the job has ended.
     stage: Option<String>,
     /// Progress of the whole job, 0..=1.
     progress: f64,
@@ -188,19 +187,22 @@ pub(super) fn accepted(job: JobId, result: &str, body: impl Serialize) -> Respon
     (StatusCode::ACCEPTED, headers, axum::Json(body)).into_response()
 }
 
-/// Returns the problem for an absent result: `not_ready` with the state of its job, or `not_found` if no job
-/// makes it.
+/// Returns the problem for an absent result: `not_ready` if its job has not ended, the job's own code if it
+/// failed or was cancelled, or `not_found` if no job makes it.
 pub(super) async fn absent_result(access: &Access, result: Uuid) -> Result<Problem, Problem> {
     let job = access.store().job_of_result(result, &access.caller.owners);
     let Some(job) = job.await? else {
         return Ok(Problem::not_found());
     };
-    let sentence = format!(
-        "the job of this result is {}: /v1/jobs/{}",
-        job.state.name(),
-        job.id
-    );
-    Ok(Problem::new(Code::NotReady, sentence))
+    let (state, id) = (job.state.name(), job.id);
+    let sentence = format!("the job of this result is {state}: /v1/jobs/{id}");
+    Ok(match (job.state, job.failure()) {
+        (JobState::Failed, Some(failure)) => {
+            Problem::lost_result(failure.code, format!("{sentence}: {}", failure.detail), id)
+        }
+        (JobState::Cancelled, _) => Problem::lost_result(Code::Cancelled, sentence, id),
+        _ => Problem::new(Code::NotReady, sentence),
+    })
 }
 
 /// Returns the analysis that must finish before a library can be used, or `None` if the library exists. Fails

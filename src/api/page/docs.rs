@@ -85,10 +85,13 @@ fn errors() -> String {
 }
 
 fn entry(code: Code) -> String {
+    let status = status_of(code);
+    // Status 460 of the tus protocol has no name in HTTP.
+    let reason = status.canonical_reason().unwrap_or("Checksum Mismatch");
     format!(
-        "<dt id=\"{code}\"><a href=\"#{code}\"><code>{code}</code></a> <small>{}</small></dt>\n\
+        "<dt id=\"{code}\"><a href=\"#{code}\"><code>{code}</code></a> <small>{} {reason}</small></dt>\n\
          <dd>{}</dd>\n<dd class=\"soft\">{}</dd>\n",
-        status_of(code),
+        status.as_str(),
         marked(code.meaning()),
         marked(code.advice()),
     )

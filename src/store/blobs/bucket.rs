@@ -86,6 +86,11 @@ impl Bucket {
         Ok(deleted.try_for_each(async |_| Ok(())).await?)
     }
 
+    pub(super) async fn size_bytes(&self, folder: &str, name: &str) -> Result<u64, Error> {
+        let path = self.path(&format!("{folder}/{name}"));
+        Ok(self.store.head(&path).await?.size)
+    }
+
     pub(super) fn read(
         &self,
         folder: &str,

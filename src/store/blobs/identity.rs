@@ -6,6 +6,9 @@ use super::{Backend, hex};
 use crate::store::tokens::random_key;
 use crate::store::{Error, Store, sql};
 
+/// Length of a mark, bytes.
+const MARK_BYTES: usize = 32;
+
 impl Store {
     /// Verifies that database and files have the same mark. Fails with [`Error::ForeignFiles`] if they differ.
     ///
@@ -25,7 +28,10 @@ impl Store {
         }
         let mark = match (of_rows, &of_files) {
             (Some(mark), _) => mark,
-            (None, Some(of_files)) => self.mark_rows(&unhex(of_files)).await?,
+            (None, Some(of_files)) => {
+                let mark = parse_mark(of_files).ok_or(Error::ForeignFiles)?;
+                self.mark_rows(&mark).await?
+            }
             (None, None) => self.mark_rows(&random_key()?).await?,
         };
         // Processes that start at the same time have all read the same mark of the database here.
@@ -77,12 +83,12 @@ impl Store {
     }
 }
 
-/// Returns the bytes of a hexadecimal text. Invalid digits are skipped, so the result then
-/// differs from the text.
-fn unhex(text: &str) -> Vec<u8> {
-    let pairs = text.as_bytes().chunks_exact(2);
+/// Returns the bytes of a mark: 64 hexadecimal digits. Returns `None` for any other text.
+fn parse_mark(text: &str) -> Option<Vec<u8>> {
+    let pairs = text.as_bytes().chunks(2);
     let bytes = pairs.map(|pair| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok());
-    bytes.flatten().collect()
+    let bytes: Vec<u8> = bytes.collect::<Option<_>>()?;
+    (bytes.len() == MARK_BYTES && hex(&bytes) == text).then_some(bytes)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! the name survives a power loss. Reads use large pieces, because each read is a task on the blocking pool.
 
 use std::fs::{self, File};
-use std::io::{self, SeekFrom};
+use std::io::{self, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use bytes::Bytes;
@@ -61,6 +61,11 @@ impl LocalFolder {
         Ok(spawn_blocking(discard).await.map_err(io::Error::other)??)
     }
 
+    pub(super) async fn size_bytes(&self, folder: &str, name: &str) -> io::Result<u64> {
+        let file = tokio::fs::metadata(self.folder(folder).join(name));
+        Ok(file.await?.len())
+    }
+
     pub(super) async fn read(
         &self,
         folder: &str,
@@ -84,10 +89,11 @@ impl LocalFolder {
 
     /// Marks these files permanently (`identity`).
     pub(super) fn set_mark(&self, mark: &str) -> io::Result<()> {
-        let unfinished = self.root.join(format!("{MARK}.new"));
-        fs::write(&unfinished, mark)?;
-        File::open(&unfinished)?.sync_all()?;
-        fs::rename(unfinished, self.root.join(MARK))?;
+        // The file gets its name only when it is complete. Another process may write the same mark.
+        let mut file = tempfile::NamedTempFile::new_in(&self.root)?;
+        file.write_all(mark.as_bytes())?;
+        file.as_file().sync_all()?;
+        file.persist(self.root.join(MARK))?;
         sync_folder(&self.root)
     }
 

@@ -154,9 +154,17 @@ impl Blobs {
         }
     }
 
-    /// Reads a stored file and returns its size and SHA-256.
-    pub async fn hash(&self, file: &BlobFile, folder: &str) -> Result<(i64, Vec<u8>), Error> {
-        self.copy(file, folder, &mut tokio::io::sink()).await
+    /// Returns whether a stored file has the size and SHA-256 of its row. Reads the whole file.
+    pub async fn is_intact(&self, file: &BlobFile, folder: &str) -> Result<bool, Error> {
+        let size_bytes = match &self.backend {
+            Backend::Local(local) => local.size_bytes(folder, &file.name).await?,
+            Backend::Bucket(bucket) => bucket.size_bytes(folder, &file.name).await?,
+        };
+        if size_bytes != file.size_bytes.unsigned_abs() {
+            return Ok(false);
+        }
+        let (_, sha256) = self.copy(file, folder, &mut tokio::io::sink()).await?;
+        Ok(sha256 == file.sha256)
     }
 
     /// Writes a stored file to `to`. Returns size and SHA-256 of the written bytes.

@@ -19,7 +19,7 @@ impl Store {
         let fail = || async {
             let mut transaction = self.writer.begin().await?;
             let n_rows = sql::query(
-                "update jobs set state = 'failed', worker = null, lease_until_ms = null, \
+                "update jobs set state = 'failed', worker = null, lease_until_ms = null, stage = null, \
                  code = $3, detail = $4, refused_jpeg = $5, finished_ms = $6 \
                  where id = $1 and fence = $2 and state = 'running'",
             )
@@ -46,7 +46,7 @@ impl Store {
         let stop = || async {
             let mut transaction = self.writer.begin().await?;
             let n_rows = sql::query(
-                "update jobs set state = 'cancelled', worker = null, lease_until_ms = null, \
+                "update jobs set state = 'cancelled', worker = null, lease_until_ms = null, stage = null, \
                  finished_ms = $3 where id = $1 and fence = $2 and state = 'running'",
             )
             .bind(lease.job_id.0)

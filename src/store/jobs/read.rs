@@ -33,7 +33,7 @@ pub struct JobRow {
     pub cancel_requested: bool,
     /// Number of attempts so far.
     pub attempt: i64,
-    /// Current stage; for a failed or cancelled job the last one, if known.
+    /// Current stage; `None` before the first one and after the end.
     pub stage: Option<String>,
     /// Completed share of the job, 0..=1.
     pub progress: f64,

@@ -155,7 +155,7 @@ async fn a_film_that_cannot_be_measured_fails_with_its_reason() {
     );
     let library = format!("/v1/libraries/{}", analysis["library_id"].as_str().unwrap());
     let answer = app.get(&library).send().await.unwrap();
-    assert_eq!(code_of(answer, 404).await, "not_ready");
+    assert_eq!(code_of(answer, 404).await, code);
     assert_eq!(app.n_folders("libraries").await, 0);
     app.assert_sound().await;
 }

@@ -107,7 +107,7 @@ async fn a_sample_that_is_stored_already_fails_with_that_reason() {
     let job = app.json(&format!("/v1/jobs/{second}")).await;
     assert_eq!(job["error"]["code"], "already_stored");
     let answer = app.get(&format!("/v1/footage/{footage_id}")).send().await;
-    assert_eq!(code_of(answer.unwrap(), 404).await, "not_ready");
+    assert_eq!(code_of(answer.unwrap(), 404).await, "already_stored");
     assert_eq!(app.n_folders("footage").await, 1);
     app.assert_sound().await;
 }
