@@ -129,7 +129,7 @@ impl JobInput for Input {
         Ok(Product {
             source: Source::Resource(self.footage_id.0),
             params: serde_json::to_string(&self.params)?,
-            summary: serde_json::to_string(&Summary::new(&library, &self.params, video.notes()))?,
+            summary: serde_json::to_string(&Summary::new(&library, &self.params, video.notices()))?,
         })
     }
 }
@@ -170,7 +170,7 @@ impl Input {
 }
 
 impl Summary {
-    fn new(library: &Library, params: &Params, notes: &[Note]) -> Summary {
+    fn new(library: &Library, params: &Params, notices: &[Notice]) -> Summary {
         let stats = &library.stats;
         Summary {
             fps: library.poses.fps,
