@@ -30,14 +30,14 @@ check: fmt clippy unit scale-test truth-test page-test contract-test docs deny #
 	@echo "all checks passed"
 
 fmt: ## check the formatting
-	$(CARGO) fmt --check
+	$(CARGO) fmt --all --check
 
 clippy: target/vendor ## run the lints, with warnings as errors
-	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 
 unit: target/vendor ## run the Rust tests
 	@scripts/system-packages.sh test
-	$(CARGO) test --locked
+	$(CARGO) test --locked --workspace
 
 # Tests of store, queue and API on PostgreSQL and a bucket, and tests that need several machines.
 SCALE_TESTS = $(CARGO) test --locked --lib store:: && $(CARGO) test --locked --lib -- --ignored store:: && \
@@ -58,15 +58,15 @@ race: target/vendor ## let eight processes race for 2000 jobs, on SQLite and on 
 # These targets use the program that the tests built. `cargo build` would build the dependencies again,
 # because it selects fewer features.
 truth-test: target/vendor ## read the ground truth of a flock with pycocotools and TrackEval
-	$(CARGO) test --locked --no-run
+	$(CARGO) test --locked --workspace --no-run
 	@scripts/python-tests.sh truth $(DEBUG)
 
 page-test: vendor ## test the page in a browser, against a running service
-	$(CARGO) test --locked --no-run
+	$(CARGO) test --locked --workspace --no-run
 	@scripts/python-tests.sh page $(DEBUG)
 
 contract-test: target/vendor ## test the API against its OpenAPI document, with schemathesis
-	$(CARGO) test --locked --no-run
+	$(CARGO) test --locked --workspace --no-run
 	@scripts/python-tests.sh contract $(DEBUG)
 
 soak: target/vendor ## kill the service two hundred times during uploads
@@ -81,10 +81,10 @@ arm-test: target/vendor ## run the library's tests on an emulated ARM processor,
 	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
 	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /usr/aarch64-linux-gnu" \
 	CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc PROPTEST_CASES=8 \
-	$(CARGO) test --locked --lib --target $(ARM) --target-dir target/arm $(ARM_TESTS)
+	$(CARGO) test --locked --workspace --lib --target $(ARM) --target-dir target/arm $(ARM_TESTS)
 
 docs: target/vendor ## build the documentation, with warnings as errors
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --workspace --no-deps --document-private-items
 
 deny: ## check licences, bans and sources of the dependencies, offline
 	@if $(CARGO) deny --version >/dev/null 2>&1; then \

@@ -52,7 +52,7 @@ def lay_out(rules):
         new = re.sub(r"\bOFF\[([a-z-]+)\]", lambda match: off(match[1]), rule["new"])
         new = re.sub(r"\bOFF\b(?! [:.])(?!\.get)", off(rule["name"]), new) if "names" not in rule else new
         texts[rule["file"]] = text.replace(rule["old"], new).encode()
-    texts["src/lib.rs"] += SWITCH.encode()
+    texts["crates/flockreel-core/src/lib.rs"] += SWITCH.encode()
     for path in SOURCES.rglob("*.rs") if SOURCES.is_dir() else []:
         name = path.relative_to(SOURCES)
         if str(name) not in texts and name.parts[0] != "target":

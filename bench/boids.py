@@ -36,7 +36,7 @@ def main():
     parser.add_argument("--steps", type=int, default=10)
     parser.add_argument("--engine", help="the built benchmark; cargo builds and runs it when absent")
     args = parser.parse_args()
-    command = [args.engine] if args.engine else ["cargo", "bench", "-q", "--bench", "boids", "--"]
+    command = [args.engine] if args.engine else ["cargo", "bench", "-q", "-p", "flockreel-core", "--bench", "boids", "--"]
     done = subprocess.run([*command, str(args.count), str(args.steps)], check=True, stdout=subprocess.PIPE)
     result = json.loads(done.stdout.splitlines()[-1])
     rate = args.count / result["all_threads_s"]

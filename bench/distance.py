@@ -83,7 +83,7 @@ def make_sprites(n_frames, width, height):
 
 
 def run_engine(args, width, height, folder):
-    command = [args.engine] if args.engine else ["cargo", "bench", "-q", "--bench", "distance", "--"]
+    command = [args.engine] if args.engine else ["cargo", "bench", "-q", "-p", "flockreel-core", "--bench", "distance", "--"]
     command += [folder / "sprites.rgba", width, height, args.clip_frames, folder]
     done = subprocess.run([str(word) for word in command], check=True, stdout=subprocess.PIPE)
     return json.loads(done.stdout.splitlines()[-1])

@@ -29,7 +29,7 @@ def main():
     parser.add_argument("--library", help="a folder that `flockreel analyze` made")
     parser.add_argument("--small-only", action="store_true")
     args = parser.parse_args()
-    command = [args.engine] if args.engine else ["cargo", "bench", "-q", "--bench", "plan", "--"]
+    command = [args.engine] if args.engine else ["cargo", "bench", "-q", "-p", "flockreel-core", "--bench", "plan", "--"]
     missed = False
     for count, frames, runs, flags, bar_s in CASES[: 1 if args.small_only else None]:
         words = [*command, str(count), str(frames), str(runs), *flags, *([args.library] if args.library else [])]

@@ -5,7 +5,9 @@
 //! for the transitions below its epsilon, on one thread and on all. With `N`, draws N sprites
 //! and times the whole search. Prints one line of JSON.
 
+#[path = "../crates/flockreel-core/benches/poses/mod.rs"]
 mod poses;
+#[path = "../crates/flockreel-core/benches/timing/mod.rs"]
 mod timing;
 
 use std::hint::black_box;
@@ -13,16 +15,16 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use flockreel::analysis::Params;
-use flockreel::analysis::similarity::distance::{ComparedSprites, Distances, Side};
-use flockreel::analysis::similarity::transition;
-use flockreel::cpu::Level;
-use flockreel::formats::library_dir;
-use flockreel::library::{Library, Pose, Poses, Sprites};
-use flockreel::progress::Silent;
-use flockreel::random;
-use flockreel::scratch::{Full, InMemory};
 use flockreel::store::Spill;
+use flockreel_core::analysis::Params;
+use flockreel_core::analysis::similarity::distance::{ComparedSprites, Distances, Side};
+use flockreel_core::analysis::similarity::transition;
+use flockreel_core::cpu::Level;
+use flockreel_core::formats::library_dir;
+use flockreel_core::library::{Library, Pose, Poses, Sprites};
+use flockreel_core::progress::Silent;
+use flockreel_core::random;
+use flockreel_core::scratch::{Full, InMemory};
 
 fn main() {
     match timing::arguments().next() {

@@ -12,13 +12,13 @@ use super::footage::{Naming, admit};
 use super::jobs::accepted;
 use super::problem::{Answer, Problem, ProblemBody};
 use super::receive::{Form, is_film, receive_with_json};
-use crate::analysis::Params;
-use crate::code::Code;
-use crate::formats::params;
-use crate::ids::{FootageId, JobId, LibraryId};
 use crate::jobs::IdSequence;
 use crate::jobs::analysis::Input;
 use crate::store::footage::{Added, Footage};
+use flockreel_core::analysis::Params;
+use flockreel_core::code::Code;
+use flockreel_core::formats::params;
+use flockreel_core::ids::{FootageId, JobId, LibraryId};
 
 /// Footage to measure, and parameters of the analysis.
 #[derive(Debug, Deserialize, ToSchema)]

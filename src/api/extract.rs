@@ -11,10 +11,10 @@ use uuid::Uuid;
 
 use super::access::Caller;
 use super::{AppState, Problem};
-use crate::code::Code;
-use crate::ids::JobId;
 use crate::jobs::{IdSequence, JobInput};
 use crate::store::Store;
+use flockreel_core::code::Code;
+use flockreel_core::ids::JobId;
 
 /// The service, and the caller on whose behalf a handler uses it.
 pub(super) struct Access {

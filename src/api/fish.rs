@@ -14,12 +14,12 @@ use super::paging::{Page, Paging};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::resources::View;
 use super::timestamp::rfc3339;
-use crate::fish::Params;
-use crate::formats::params;
-use crate::ids::{FishId, JobId, LibraryId};
 use crate::jobs::IdSequence;
 use crate::jobs::fish::{Input, Summary};
 use crate::store::resources::{FilmRow, Fish};
+use flockreel_core::fish::Params;
+use flockreel_core::formats::params;
+use flockreel_core::ids::{FishId, JobId, LibraryId};
 
 const FILES: Files = &[
     ("model.glb", "model/gltf-binary"),

@@ -26,10 +26,10 @@ use super::access::Caller;
 use super::problem::Transient;
 use super::receive::media_type;
 use super::{AppState, MAX_JSON_BYTES, Problem};
-use crate::code::Code;
 use crate::jobs::{self, IdSequence};
 use crate::store::Store;
 use crate::store::idempotency::{Answer, Begun, LEASE_MS, Scope};
+use flockreel_core::code::Code;
 
 /// Routes that create something and accept a key.
 pub(super) const ROUTES: [&str; 5] = [

@@ -56,7 +56,7 @@ pub(super) struct LibraryView {
     /// Time of creation, RFC 3339 in UTC.
     created_at: String,
     /// All parameters of the analysis, including defaults.
-    #[schema(value_type = crate::analysis::Params)]
+    #[schema(value_type = flockreel_core::analysis::Params)]
     params: Value,
     #[serde(flatten)]
     summary: Summary,

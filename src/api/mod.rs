@@ -51,12 +51,12 @@ use monitoring::{health, metrics};
 use page::{docs, openapi};
 use receive::CHUNK_TIMEOUT;
 
-use crate::code::Code;
 use crate::config::Config;
 use crate::jobs::Context;
 use crate::jobs::supervisor::recover;
 use crate::store::Store;
 use crate::{media, store};
+use flockreel_core::code::Code;
 
 /// Largest JSON body, bytes. Free choice.
 const MAX_JSON_BYTES: usize = 1 << 20;

@@ -10,7 +10,7 @@ use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
 use super::Problem;
-use crate::code::Code;
+use flockreel_core::code::Code;
 
 /// Largest page, items. Free choice.
 const MAX_LIMIT: i64 = 200;

@@ -5,10 +5,10 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::code::Code;
-use crate::formats::params;
-use crate::ids::JobId;
 use crate::{jobs, store};
+use flockreel_core::code::Code;
+use flockreel_core::formats::params;
+use flockreel_core::ids::JobId;
 
 /// Result of a handler.
 pub(super) type Answer = Result<Response, Problem>;

@@ -17,13 +17,13 @@ use tokio::time::timeout;
 
 use super::server::is_too_slow;
 use super::{AppState, MAX_JSON_BYTES, Problem};
-use crate::code::Code;
 use crate::jobs::admit::ReceivedFiles;
 use crate::store;
 use crate::store::footage::{BACKGROUND, MASKS, VIDEO};
 use crate::store::intake::Intake;
 use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
+use flockreel_core::code::Code;
 
 /// Longest wait for the next chunk of a body (docs/explanation/promises.md, "Slow clients"). Free choice.
 pub(super) const CHUNK_TIMEOUT: Duration = Duration::from_secs(30);

@@ -21,13 +21,13 @@ use super::problem::{Answer, Problem, ProblemBody};
 use super::receive::{
     CHECK_EVERY_BYTES, CHUNK_TIMEOUT, check_free_space, code_of_broken_body, label,
 };
-use crate::code::Code;
 use crate::jobs::IdSequence;
 use crate::jobs::admit::ReceivedFiles;
 use crate::jobs::clock::now_ms;
 use crate::store::footage::Added;
 use crate::store::owners::OwnerFilter;
 use crate::store::uploads::{LIFETIME_MS, Upload, UploadLock};
+use flockreel_core::code::Code;
 
 const VERSION: HeaderValue = HeaderValue::from_static("1.0.0");
 const RESUMABLE: HeaderName = HeaderName::from_static("tus-resumable");

@@ -9,16 +9,16 @@ use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
 
 use super::{Error, Listener, Summary, set};
-use crate::analysis::{self, Params};
-use crate::cpu;
-use crate::footage::{FrameSource, Part};
-use crate::formats::library_json::FootageSummary;
-use crate::formats::{csv, library_dir, params, svg};
 use crate::jobs::analysis::{Advice, read_options};
 use crate::jobs::masks::Masks;
 use crate::jobs::{overlay, refusal};
-use crate::library::{Library, Poses, View};
 use crate::media::{self, Limits, Tool, Video, read_image};
+use flockreel_core::analysis::{self, Params};
+use flockreel_core::cpu;
+use flockreel_core::footage::{FrameSource, Part};
+use flockreel_core::formats::library_json::FootageSummary;
+use flockreel_core::formats::{csv, library_dir, params, svg};
+use flockreel_core::library::{Library, Poses, View};
 
 /// Arguments of `analyze`.
 #[derive(Debug, clap::Args)]

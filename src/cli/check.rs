@@ -8,11 +8,11 @@ use std::time::Duration;
 use serde_json::json;
 
 use super::{Error, Summary, runtime, say};
-use crate::code::Code;
 use crate::config::{Database, Storage};
 use crate::jobs::clock::now_ms;
 use crate::store::check::Fault;
 use crate::store::{self, Store};
+use flockreel_core::code::Code;
 
 /// Delay before a second check. A fault that is gone by then was an operation in progress. Free choice.
 const RECHECK_DELAY: Duration = Duration::from_secs(2);

@@ -8,8 +8,8 @@ use serde_json::{Value, json};
 
 use super::{Error, Summary};
 use crate::config::{self, Config, Storage};
-use crate::cpu::Level;
 use crate::media::{self, Codecs};
+use flockreel_core::cpu::Level;
 
 /// Arguments of `doctor`.
 #[derive(Debug, clap::Args)]

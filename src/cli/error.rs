@@ -3,8 +3,9 @@
 //! This module decides which error codes are the user's fault (2) and which are internal failures (1), as
 //! `api/problem.rs` does for HTTP.
 
-use crate::code::Code;
-use crate::{fish, jobs, media, store};
+use crate::{jobs, media, store};
+use flockreel_core::code::Code;
+use flockreel_core::fish;
 
 /// Reasons why a command failed. Each prints as one line in lower case, with the value at the end.
 #[derive(Debug, thiserror::Error)]

@@ -6,12 +6,12 @@ use std::path::PathBuf;
 use serde_json::{Map, Value, json};
 
 use super::{Error, Listener, Summary, set};
-use crate::fish::{self, Film, Motion, Params, side_by_side};
-use crate::formats::{glb, params};
-use crate::library::Library;
 use crate::media::{self, Tool, VideoFormat, VideoWriter};
-use crate::progress::Progress;
-use crate::raster::{ColorSpec, Frame};
+use flockreel_core::fish::{self, Film, Motion, Params, side_by_side};
+use flockreel_core::formats::{glb, params};
+use flockreel_core::library::Library;
+use flockreel_core::progress::Progress;
+use flockreel_core::raster::{ColorSpec, Frame};
 
 /// Arguments of `fish`.
 #[derive(Debug, clap::Args)]

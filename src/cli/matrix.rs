@@ -6,13 +6,13 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::{Error, Listener, Summary};
-use crate::analysis::similarity::distance::{
+use flockreel_core::analysis::similarity::distance::{
     Cancelled, ComparedSprites, DistanceMatrix, Distances, Side,
 };
-use crate::code::Code;
-use crate::cpu::Level;
-use crate::formats::distance_map::DistanceMap;
-use crate::formats::npy;
+use flockreel_core::code::Code;
+use flockreel_core::cpu::Level;
+use flockreel_core::formats::distance_map::DistanceMap;
+use flockreel_core::formats::npy;
 
 /// Arguments of `matrix`.
 #[derive(Debug, clap::Args)]

@@ -37,11 +37,11 @@ pub use error::Error;
 pub use progress::Listener;
 
 use crate::config;
-use crate::formats::library_dir::{self, StoredLibrary};
 use crate::logging::{self, LogFormat, say};
 use crate::media::{self, Tool};
-use crate::scratch::Scratch;
 use crate::store::Spill;
+use flockreel_core::formats::library_dir::{self, StoredLibrary};
+use flockreel_core::scratch::Scratch;
 
 /// flockreel: film one animal, get a flock of it.
 #[derive(Debug, Parser)]

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::progress::Progress;
+use flockreel_core::progress::Progress;
 
 /// Number of steps of a stage. A plain line is written at its start and after each step. Free choice.
 const PLAIN_STEPS: f64 = 4.0;

@@ -6,12 +6,12 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::{Error, Listener, Summary};
-use crate::fish::sample::{SampleFilm, SampleParams};
-use crate::footage::{FrameSource, SourceError};
-use crate::formats::poses_json;
 use crate::media::VideoWriter;
-use crate::progress::Progress;
-use crate::raster::Frame;
+use flockreel_core::fish::sample::{SampleFilm, SampleParams};
+use flockreel_core::footage::{FrameSource, SourceError};
+use flockreel_core::formats::poses_json;
+use flockreel_core::progress::Progress;
+use flockreel_core::raster::Frame;
 
 /// Arguments of `sample`.
 #[derive(Debug, clap::Args)]

@@ -6,7 +6,7 @@
 use serde_json::{Map, Value, json};
 
 use super::Error;
-use crate::parameters::{Parameters, Schemas};
+use flockreel_core::parameters::{Parameters, Schemas};
 
 /// Overrides parameters with the values of `--set`. Fails where one has no `=`, or a name leads into a value that is
 /// not an object.
@@ -112,19 +112,19 @@ mod tests {
 
     #[test]
     fn help_of_a_flag_follows_from_the_parameter() {
-        let help = parameter_help::<crate::flock::Params>("variation");
+        let help = parameter_help::<flockreel_core::flock::Params>("variation");
         assert!(help.contains("Limits: 0 to 0.3 [default: 0.05]"), "{help}");
-        let help = parameter_help::<crate::flock::Params>("render.cut");
+        let help = parameter_help::<flockreel_core::flock::Params>("render.cut");
         assert!(
             help.ends_with("[default: fade] [possible values: fade, morph]"),
             "{help}"
         );
-        let help = parameter_help::<crate::analysis::Params>("view");
+        let help = parameter_help::<flockreel_core::analysis::Params>("view");
         assert!(
             help.ends_with("Default: guessed [possible values: side, top]"),
             "{help}"
         );
-        let help = parameter_help::<crate::analysis::Params>("kappa");
+        let help = parameter_help::<flockreel_core::analysis::Params>("kappa");
         assert!(help.ends_with("Above 0 [default: 2.0]"), "{help}");
     }
 }

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::{Error, Summary};
-use crate::formats::{picture, picture_archive};
+use flockreel_core::formats::{picture, picture_archive};
 
 /// Arguments of `sprites`.
 #[derive(Debug, clap::Args)]

@@ -6,11 +6,11 @@ use uuid::Uuid;
 use super::clock::now_ms;
 use super::masks::Masks;
 use super::{Context, Error};
-use crate::footage::{FootageFormat, FrameSource};
 use crate::media::{Limits, ReadOptions, Video, read_image};
 use crate::store::footage::{Added, BACKGROUND, Footage, MASKS, VIDEO};
 use crate::store::owners::Owner;
 use crate::store::{BlobFile, Draft};
+use flockreel_core::footage::{FootageFormat, FrameSource};
 
 /// Files received into a draft, synced and hashed, with their label and owner.
 pub struct ReceivedFiles {
@@ -70,7 +70,9 @@ fn inspect(received: &ReceivedFiles) -> Result<FootageFormat, Error> {
         let image = read_image(&received.draft.path().join(BACKGROUND), &limits)?;
         let (found, wanted) = ([image.width, image.height], [format.width, format.height]);
         if found != wanted {
-            return Err(crate::analysis::Error::BackgroundSizeDiffers { found, wanted }.into());
+            return Err(
+                flockreel_core::analysis::Error::BackgroundSizeDiffers { found, wanted }.into(),
+            );
         }
     }
     Ok(format)
@@ -127,6 +129,6 @@ mod tests {
             owner: Owner::local(),
         };
         let refused = admit(&context, received).await.unwrap_err();
-        assert_eq!(refused.code(), crate::code::Code::Busy);
+        assert_eq!(refused.code(), flockreel_core::code::Code::Busy);
     }
 }

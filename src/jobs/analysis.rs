@@ -8,20 +8,21 @@ use utoipa::ToSchema;
 use super::decoding::Counted;
 use super::masks::Masks;
 use super::{Attempt, Error, JobInput, Product, Stages, overlay, refusal};
-use crate::analysis::similarity::distance::{ComparedSprites, Distances, Side};
-use crate::analysis::{self, Params, analyze};
-use crate::footage::{FrameSource, Part};
-use crate::formats::distance_map::DistanceMap;
-use crate::formats::library_json::FootageSummary;
-use crate::formats::{csv, library_dir, svg};
-use crate::ids::{FootageId, LibraryId};
-use crate::library::{Library, View};
 use crate::media::{Limits, Notice, ReadOptions, Video, read_image};
-use crate::progress::Progress;
+use crate::store;
 use crate::store::footage::{BACKGROUND, Footage, MASKS, VIDEO};
 use crate::store::jobs::Kind;
 use crate::store::jobs::finish::Source;
-use crate::{cpu, store};
+use flockreel_core::analysis::similarity::distance::{ComparedSprites, Distances, Side};
+use flockreel_core::analysis::{self, Params, analyze};
+use flockreel_core::cpu;
+use flockreel_core::footage::{FrameSource, Part};
+use flockreel_core::formats::distance_map::DistanceMap;
+use flockreel_core::formats::library_json::FootageSummary;
+use flockreel_core::formats::{csv, library_dir, svg};
+use flockreel_core::ids::{FootageId, LibraryId};
+use flockreel_core::library::{Library, View};
+use flockreel_core::progress::Progress;
 
 /// Stages with their share of the running time; measured.
 pub const STAGES: Stages = &[

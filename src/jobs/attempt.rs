@@ -7,16 +7,16 @@ use tokio::runtime::Handle;
 use uuid::Uuid;
 
 use super::{Error, Listener};
-use crate::formats::library_dir;
-use crate::ids::{FootageId, LibraryId};
-use crate::library::Library;
-use crate::progress::Progress;
-use crate::scratch::Scratch;
 use crate::store::footage::Footage;
 use crate::store::jobs::finish::Source;
 use crate::store::owners::OwnerFilter;
 use crate::store::resources::{self, Resource};
 use crate::store::{Draft, Fetched, Spill, Store};
+use flockreel_core::formats::library_dir;
+use flockreel_core::ids::{FootageId, LibraryId};
+use flockreel_core::library::Library;
+use flockreel_core::progress::Progress;
+use flockreel_core::scratch::Scratch;
 
 /// One attempt at a job: its folder, its access to stored data, and its progress reports.
 pub struct Attempt<'a> {

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use super::Listener;
-use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit};
-use crate::raster::Frame;
+use flockreel_core::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit};
+use flockreel_core::raster::Frame;
 
 /// A video source that reports its frames and its reading time to the listener.
 pub(super) struct Counted<'a, S: ?Sized> {

@@ -1,8 +1,9 @@
 //! Errors of jobs: why a job failed, with the stable code of each reason.
 
-use crate::code::Code;
-use crate::footage::SourceError;
-use crate::{analysis, fish, flock, formats, media, store};
+use crate::{media, store};
+use flockreel_core::code::Code;
+use flockreel_core::footage::SourceError;
+use flockreel_core::{analysis, fish, flock, formats};
 
 /// Reasons why a job did not finish, one variant per failing part.
 #[derive(Debug, thiserror::Error)]

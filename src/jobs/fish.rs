@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::{Attempt, Error, JobInput, Product, Stages};
-use crate::fish::{Film, Params, drive};
-use crate::formats::glb;
-use crate::ids::{FishId, LibraryId};
 use crate::media::{VideoFormat, VideoWriter};
-use crate::progress::Progress;
-use crate::raster::{ColorSpec, Frame};
 use crate::store::jobs::Kind;
 use crate::store::jobs::finish::Source;
+use flockreel_core::fish::{Film, Params, drive};
+use flockreel_core::formats::glb;
+use flockreel_core::ids::{FishId, LibraryId};
+use flockreel_core::progress::Progress;
+use flockreel_core::raster::{ColorSpec, Frame};
 
 /// Stages with their share of the running time.
 pub const STAGES: Stages = &[("loading", 0.05), ("rendering", 0.95)];

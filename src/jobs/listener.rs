@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use crate::progress::Progress;
+use flockreel_core::progress::Progress;
 
 /// Stages of a kind of job, in order, with the share of the running time of each. The shares add up to 1.
 pub type Stages = &'static [(&'static str, f64)];

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::Error;
-use crate::footage::{FrameSource, Masked, Visit};
 use crate::media::{Limits, ReadOptions, Video};
+use flockreel_core::footage::{FrameSource, Masked, Visit};
 
 /// Alpha below which a pixel counts as transparent, 0..=255. Free choice.
 const MIN_OPAQUE_ALPHA: u8 = 250;

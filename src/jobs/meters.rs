@@ -116,9 +116,9 @@ impl Meters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::code::Code;
-    use crate::ids::JobId;
-    use crate::progress::Progress;
+    use flockreel_core::code::Code;
+    use flockreel_core::ids::JobId;
+    use flockreel_core::progress::Progress;
 
     #[test]
     fn attempt_is_counted_with_its_stages_and_frames() {

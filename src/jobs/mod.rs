@@ -47,11 +47,11 @@ pub use listener::{Listener, Stages};
 pub use meters::Meters;
 
 use crate::config::JobSettings;
-use crate::ids::JobId;
 use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::{Kind, Lease};
 use crate::store::owners::Account;
 use crate::store::{self, Store};
+use flockreel_core::ids::JobId;
 
 /// Data shared by workers. Smaller than the state of the API.
 #[derive(Clone)]

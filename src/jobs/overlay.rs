@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use super::Error;
-use crate::footage::FrameSource;
-use crate::formats::overlay::Overlay;
-use crate::library::Poses;
 use crate::media::VideoWriter;
-use crate::progress::Progress;
-use crate::raster::Frame;
+use flockreel_core::footage::FrameSource;
+use flockreel_core::formats::overlay::Overlay;
+use flockreel_core::library::Poses;
+use flockreel_core::progress::Progress;
+use flockreel_core::raster::Frame;
 
 /// Writes the footage with its poses drawn over it to `path`. The extension of `path` selects the container.
 pub fn film(

@@ -2,10 +2,10 @@
 //! (docs/explanation/algorithms.md, "Refused footage").
 
 use super::Error;
-use crate::analysis;
-use crate::footage::{FrameSource, SourceError};
-use crate::formats::evidence;
-use crate::raster::Frame;
+use flockreel_core::analysis;
+use flockreel_core::footage::{FrameSource, SourceError};
+use flockreel_core::formats::evidence;
+use flockreel_core::raster::Frame;
 
 /// File name of the picture, also in URLs.
 pub const FILE_NAME: &str = "refused.jpg";

@@ -6,17 +6,17 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{Attempt, Context, Error, IdSequence, JobInput, Product, Stages, analysis, flock};
-use crate::fish::sample::{SampleFilm, SampleParams};
-use crate::footage::FrameSource;
-use crate::ids::FootageId;
 use crate::media::VideoWriter;
-use crate::progress::Progress;
-use crate::raster::Frame;
 use crate::store;
 use crate::store::footage::{Footage, SampleFootage, VIDEO};
 use crate::store::jobs::Kind;
 use crate::store::jobs::finish::Source;
 use crate::store::owners::{Account, OwnerFilter};
+use flockreel_core::fish::sample::{SampleFilm, SampleParams};
+use flockreel_core::footage::FrameSource;
+use flockreel_core::ids::FootageId;
+use flockreel_core::progress::Progress;
+use flockreel_core::raster::Frame;
 
 /// Stages with their share of the running time.
 pub const STAGES: Stages = &[("filming", 1.0)];
@@ -50,13 +50,13 @@ pub async fn fill(context: &Context) -> Result<(), store::Error> {
     let (sample_job, footage_id) = sample.await?;
     let analysis = analysis::Input {
         footage_id,
-        params: crate::analysis::Params::default(),
+        params: flockreel_core::analysis::Params::default(),
     };
     let analysis = context.enqueue(&analysis, Some(sample_job), &account, &mut ids);
     let (analysis_job, library_id) = analysis.await?;
     let flock = flock::Input {
         library_id,
-        params: crate::flock::Params::default(),
+        params: flockreel_core::flock::Params::default(),
     };
     let flock = context.enqueue(&flock, Some(analysis_job), &account, &mut ids);
     flock.await?;

@@ -10,8 +10,8 @@ use tokio::time::{sleep, timeout};
 
 use super::worker::{Step, Worker};
 use super::{Context, clock};
-use crate::ids::JobId;
 use crate::store::{self, Store, jobs::JobState};
+use flockreel_core::ids::JobId;
 
 /// Interval at which idle workers look for jobs, even without a notification. Free choice.
 const POLL_INTERVAL: Duration = Duration::from_secs(1);

@@ -9,14 +9,16 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{Context, Error};
-use crate::analysis::similarity::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
-use crate::cpu::Level;
-use crate::flock::{Params, plan_flock};
-use crate::formats::library_dir::{self, StoredLibrary};
-use crate::formats::{flock_json, npy};
-use crate::progress::Progress;
 use crate::store::resources::Library;
 use crate::store::{Draft, Spill};
+use flockreel_core::analysis::similarity::distance::{
+    ComparedSprites, DistanceMatrix, Distances, Side,
+};
+use flockreel_core::cpu::Level;
+use flockreel_core::flock::{Params, plan_flock};
+use flockreel_core::formats::library_dir::{self, StoredLibrary};
+use flockreel_core::formats::{flock_json, npy};
+use flockreel_core::progress::Progress;
 
 /// Simulates and plans a flock. Returns its `flock.json`.
 pub async fn preview_flock(
@@ -38,7 +40,7 @@ pub async fn distance_file(context: &Context, library: &Library) -> Result<File,
         npy::check(library.sprites.n_frames())?;
         let planes = stored.params.planes;
         let pixels = ComparedSprites::new(&library.sprites, &library.poses, planes);
-        let pixels = pixels.map_err(crate::analysis::Error::Full)?;
+        let pixels = pixels.map_err(flockreel_core::analysis::Error::Full)?;
         let distances = Distances {
             pixels: &pixels,
             clip: stored.params.clip(library.clip_frames),

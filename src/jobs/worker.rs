@@ -17,13 +17,13 @@ use uuid::Uuid;
 use super::clock::now_ms;
 use super::listener::Position;
 use super::{Attempt, Context, Error, Listener, Product, run, stages};
-use crate::code::Code;
-use crate::ids::JobId;
 use crate::store;
 use crate::store::Store;
 use crate::store::jobs::finish::Outcome;
 use crate::store::jobs::heartbeat::Beat;
 use crate::store::jobs::{Change, Lease};
+use flockreel_core::code::Code;
+use flockreel_core::ids::JobId;
 
 /// Interval at which the worker checks a running job. Free choice.
 const TICK: Duration = Duration::from_millis(500);
@@ -306,7 +306,7 @@ async fn finish(store: &Store, lease: &Lease, outcome: &Outcome) -> Result<Chang
 
 /// Returns whether the computation ended because it was cancelled, and not because of an error.
 fn was_stopped(error: &Error, listener: &Listener) -> bool {
-    crate::progress::Progress::cancelled(listener)
+    flockreel_core::progress::Progress::cancelled(listener)
         && !matches!(error, Error::TimeLimit | Error::DiskFull)
 }
 

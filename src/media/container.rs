@@ -191,7 +191,7 @@ fn is_transport_stream(head: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::code::Code;
+    use flockreel_core::code::Code;
 
     fn code_of(head: &[u8]) -> Code {
         Container::detect(head)

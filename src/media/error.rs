@@ -3,8 +3,8 @@
 
 use std::io;
 
-use crate::code::Code;
-use crate::footage::SourceError;
+use flockreel_core::code::Code;
+use flockreel_core::footage::SourceError;
 
 /// The missing part of a damaged film.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

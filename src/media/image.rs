@@ -8,7 +8,7 @@ use image::{DynamicImage, ImageError, ImageFormat, ImageReader};
 
 use super::error::Error;
 use super::limits::Limits;
-use crate::raster::RgbImage;
+use flockreel_core::raster::RgbImage;
 
 /// Reads an image file; see [`decode_image`].
 pub fn read_image(path: &Path, limits: &Limits) -> Result<RgbImage, Error> {
@@ -72,7 +72,7 @@ fn from_image(error: ImageError) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::code::Code;
+    use flockreel_core::code::Code;
 
     fn png_of(width: u32, height: u32) -> Vec<u8> {
         let mut bytes = Vec::new();

@@ -8,7 +8,7 @@ use super::limits::Limits;
 use super::notice::Notice;
 use super::pictures::Pictures;
 use super::read_options::ReadOptions;
-use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit};
+use flockreel_core::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit};
 
 /// Footage that is within the limits and can be read any number of times.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use sqlx::error::DatabaseError;
 use sqlx::sqlite::SqliteError;
 
-use crate::code::Code;
+use flockreel_core::code::Code;
 
 /// SQLite's result code SQLITE_FULL: the low byte of its extended codes.
 const SQLITE_FULL: u32 = 13;

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{OnceLock, PoisonError, RwLock};
 
-use crate::scratch::{Full, Scratch};
+use flockreel_core::scratch::{Full, Scratch};
 
 /// Maximum number of bytes held in memory. Free choice.
 const MAX_HELD_BYTES: usize = 48 << 20;
@@ -112,6 +112,6 @@ mod tests {
     fn missing_folder_is_an_error() {
         let spill = Spill::with_limit(Path::new("/nowhere/at/all"), 0);
         let error = spill.put(b"bytes").expect_err("there is no folder");
-        assert_eq!(error.code(), crate::code::Code::Internal);
+        assert_eq!(error.code(), flockreel_core::code::Code::Internal);
     }
 }

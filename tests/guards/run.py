@@ -77,7 +77,8 @@ def lay_out(guards):
                 sys.exit(f"guards: {guard['name']}: stands {text.count(edit['old'])} times in {edit['file']}: {edit['old']}")
             new = re.sub(r"\bOFF\b", f'crate::guard_off("{guard["name"]}")', edit["new"])
             switched[edit["file"]] = text.replace(edit["old"], new)
-    switched["src/lib.rs"] = switched.get("src/lib.rs", texts["src/lib.rs"].decode()) + SWITCH
+    for root in ("src/lib.rs", "crates/flockreel-core/src/lib.rs"):
+        switched[root] = switched.get(root, texts[root].decode()) + SWITCH
     texts.update({name: text.encode() for name, text in switched.items()})
     for name, text in texts.items():
         path = SOURCES / name

@@ -17,10 +17,10 @@ use super::caller::{Caller, Proof};
 use super::cookie::session_cookie;
 use super::link::link_caller;
 use crate::api::{AppState, Problem};
-use crate::code::Code;
 use crate::jobs::clock::now_ms;
 use crate::store::tokens::secret::Presented;
 use crate::store::tokens::{Scope, Token};
+use flockreel_core::code::Code;
 
 /// Address of the other end of the connection. Behind a proxy, it is the address of the proxy.
 #[derive(Clone, Copy, Debug)]

@@ -5,11 +5,11 @@ use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 
 use crate::api::{AppState, Problem};
-use crate::code::Code;
 use crate::jobs::clock::now_ms;
 use crate::store::owners::{Account, Owner, OwnerFilter};
 use crate::store::tokens::secret::Presented;
 use crate::store::tokens::{Scope, Token};
+use flockreel_core::code::Code;
 
 /// The authenticated sender of a request. Every handler that reads or writes data of an owner takes it.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use crate::api::Problem;
-use crate::code::Code;
+use flockreel_core::code::Code;
 
 /// Content security policy: only resources of this service, nothing inline, and no embedding in frames.
 /// `blob:` lets the page show videos that it holds in memory.

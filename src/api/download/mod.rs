@@ -12,9 +12,9 @@ use axum::response::IntoResponse;
 use self::range::{Wanted, wanted};
 use super::Problem;
 use super::extract::Conditions;
-use crate::code::Code;
 use crate::store::Store;
 use crate::store::blobs::hex;
+use flockreel_core::code::Code;
 
 /// A stored file to send.
 #[derive(Clone, Debug)]

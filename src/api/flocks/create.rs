@@ -9,12 +9,12 @@ use crate::api::footage::admit;
 use crate::api::jobs::{accepted, job_to_follow};
 use crate::api::problem::{Answer, ProblemBody};
 use crate::api::receive::{Form, is_film, receive_with_json};
-use crate::flock::Params;
-use crate::formats::params;
-use crate::ids::{FootageId, JobId};
 use crate::jobs::flock::Input;
 use crate::jobs::{IdSequence, analysis};
 use crate::store::footage::Added;
+use flockreel_core::flock::Params;
+use flockreel_core::formats::params;
+use flockreel_core::ids::{FootageId, JobId};
 
 /// Start making a flock.
 ///

@@ -17,9 +17,9 @@ use crate::api::download::find as find_file;
 use crate::api::extract::{Access, Id, Json};
 use crate::api::problem::{Answer, Problem, ProblemBody};
 use crate::api::timestamp::rfc3339;
-use crate::code::Code;
 use crate::jobs::clock::now_ms;
 use crate::store::resources::Flock;
+use flockreel_core::code::Code;
 
 /// Range of the lifetime of a link, seconds: a minute to a week. Free choice.
 const LIFETIMES_S: RangeInclusive<i64> = 60..=604_800;

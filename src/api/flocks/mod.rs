@@ -18,10 +18,10 @@ use super::paging::{Page, Paging};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::resources::View;
 use super::timestamp::rfc3339;
-use crate::flock::Params;
-use crate::ids::{FlockId, JobId, LibraryId};
 use crate::jobs::flock::Summary;
 use crate::store::resources::{FilmRow, Flock};
+use flockreel_core::flock::Params;
+use flockreel_core::ids::{FlockId, JobId, LibraryId};
 
 const FILES: Files = &[
     ("flock.json", "application/json"),

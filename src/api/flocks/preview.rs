@@ -6,11 +6,11 @@ use axum::response::IntoResponse;
 use super::FlockRequest;
 use crate::api::extract::{Access, Json};
 use crate::api::problem::{Answer, Problem, ProblemBody};
-use crate::code::Code;
-use crate::flock::Params;
-use crate::formats::params;
 use crate::jobs::synchronous;
 use crate::store::resources::Library;
+use flockreel_core::code::Code;
+use flockreel_core::flock::Params;
+use flockreel_core::formats::params;
 
 /// Largest product of individuals and frames of a preview: about a second of computing.
 const MAX_PREVIEWED_POSES: u64 = 200_000;

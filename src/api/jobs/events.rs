@@ -22,10 +22,10 @@ use uuid::Uuid;
 use super::{JobView, find, is_final};
 use crate::api::extract::{Access, Id};
 use crate::api::problem::{Answer, ProblemBody};
-use crate::ids::JobId;
 use crate::jobs::clock::now_ms;
 use crate::store;
 use crate::store::jobs::read::JobRow;
+use flockreel_core::ids::JobId;
 
 /// Interval between two queries of a stream: as often as workers store progress.
 const POLL_INTERVAL: Duration = Duration::from_millis(500);

@@ -17,14 +17,14 @@ use super::paging::{Page, Paging};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::timestamp::rfc3339;
 
-use crate::code::Code;
-use crate::ids::{JobId, LibraryId};
 use crate::jobs::clock::now_ms;
 use crate::jobs::refusal::FILE_NAME;
 use crate::store::jobs::cancel::Cancel;
 use crate::store::jobs::read::JobRow;
 use crate::store::jobs::{JobState, Kind};
 use crate::store::resources::Library;
+use flockreel_core::code::Code;
+use flockreel_core::ids::{JobId, LibraryId};
 
 /// A unit of queued work.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]

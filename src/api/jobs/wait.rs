@@ -12,10 +12,10 @@ use axum::response::Response;
 use tokio::time::{Instant, sleep};
 
 use crate::api::AppState;
-use crate::ids::JobId;
 use crate::store::jobs::JobState;
 use crate::store::jobs::read::JobRow;
 use crate::store::owners::OwnerFilter;
+use flockreel_core::ids::JobId;
 
 const PREFER: HeaderName = HeaderName::from_static("prefer");
 /// Longest wait, seconds. Free choice.

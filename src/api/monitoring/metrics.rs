@@ -27,12 +27,12 @@ use super::observe::Requests;
 use crate::api::AppState;
 use crate::api::access::{Caller, HostNames, guard};
 use crate::api::problem::{Problem, ProblemBody};
-use crate::code::Code;
 use crate::jobs::Meters;
 use crate::jobs::clock::now_ms;
 use crate::logging;
 use crate::store::jobs::{JobState, Kind};
 use crate::store::upkeep::census::Census;
+use flockreel_core::code::Code;
 
 const MEDIA_TYPE: HeaderValue =
     HeaderValue::from_static("application/openmetrics-text; version=1.0.0; charset=utf-8");

@@ -19,8 +19,8 @@ use utoipa_swagger_ui::Config;
 use super::{media_type, tagged};
 use crate::api::problem::status_of;
 use crate::api::{AppState, Problem};
-use crate::code::Code;
 use crate::store::blobs::hex;
+use flockreel_core::code::Code;
 
 /// Files of Swagger UI that the page loads. Its other files are not served.
 const FILES: [&str; 2] = ["swagger-ui.css", "swagger-ui-bundle.js"];

@@ -13,8 +13,8 @@ use utoipa::openapi::security::{ApiKey, ApiKeyValue, HttpAuthScheme, HttpBuilder
 use utoipa::openapi::{OpenApi, RefOr, Required};
 
 use crate::api::{AppState, idempotency};
-use crate::parameters::Parameters;
-use crate::{analysis, fish, flock};
+use flockreel_core::parameters::Parameters;
+use flockreel_core::{analysis, fish, flock};
 
 /// Title and security schemes of the document. The routes add their own entries.
 #[derive(utoipa::OpenApi)]

@@ -30,7 +30,7 @@ use slow_clients::{MinRateBody, WriteTimeout};
 
 use super::Problem;
 use super::access::Peer;
-use crate::code::Code;
+use flockreel_core::code::Code;
 
 /// Largest number of connections that are served normally. Free choice.
 const MAX_CONNECTIONS: usize = 2048;

@@ -14,12 +14,12 @@ use serde_json::{Map, Value, json};
 
 use self::outputs::Outputs;
 use super::{Error, Listener, Summary, set};
-use crate::flock::advice::Advice;
-use crate::flock::{Flock, Params, plan_flock};
-use crate::formats::{flock_json, params, svg};
 use crate::jobs::flock::film::Film;
-use crate::library::Library;
 use crate::media::{self, Tool};
+use flockreel_core::flock::advice::Advice;
+use flockreel_core::flock::{Flock, Params, plan_flock};
+use flockreel_core::formats::{flock_json, params, svg};
+use flockreel_core::library::Library;
 
 /// Arguments of `flock`.
 #[derive(Debug, clap::Args)]

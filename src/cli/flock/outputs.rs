@@ -7,12 +7,12 @@ use serde_json::{Map, Value, json};
 
 use crate::cli::sample::parse_size;
 use crate::cli::{Error, extension, set};
-use crate::flock::Params;
-use crate::flock::composite::params::{Background, Format, Render};
 use crate::jobs::flock::film::Backdrop;
 use crate::jobs::flock::target::{Output, Target};
 use crate::media::{Limits, Video, read_image};
-use crate::raster::RgbImage;
+use flockreel_core::flock::Params;
+use flockreel_core::flock::composite::params::{Background, Format, Render};
+use flockreel_core::raster::RgbImage;
 
 /// Flags about the film.
 #[derive(Debug, clap::Args)]

@@ -2,10 +2,10 @@
 //! (docs/explanation/algorithms.md, "Compositing"). Its frames are chosen by time, so the two frame rates may
 //! differ.
 
-use crate::flock::Shot;
-use crate::footage::{FrameSource, FrameStream};
 use crate::jobs::Error;
-use crate::raster::Frame;
+use flockreel_core::flock::Shot;
+use flockreel_core::footage::{FrameSource, FrameStream};
+use flockreel_core::raster::Frame;
 
 /// A background video that is read along with the flock.
 pub(super) struct BackgroundVideo<'a> {

@@ -11,14 +11,14 @@ use super::background_video::BackgroundVideo;
 use super::sink::{self, Sink};
 use super::target::{Output, Target};
 use super::truth::TruthFolder;
-use crate::flock::composite::params::{Background, Format};
-use crate::flock::{Compositor, Flock, Shot};
-use crate::footage::FrameSource;
-use crate::formats::ground_truth::FilmShape;
 use crate::jobs::Error;
-use crate::library::Library;
-use crate::progress::Progress;
-use crate::raster::RgbImage;
+use flockreel_core::flock::composite::params::{Background, Format};
+use flockreel_core::flock::{Compositor, Flock, Shot};
+use flockreel_core::footage::FrameSource;
+use flockreel_core::formats::ground_truth::FilmShape;
+use flockreel_core::library::Library;
+use flockreel_core::progress::Progress;
+use flockreel_core::raster::RgbImage;
 
 /// A flock with everything needed to draw it.
 #[derive(Clone, Copy)]

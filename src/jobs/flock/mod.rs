@@ -20,13 +20,13 @@ use self::film::{Backdrop, Film};
 use self::target::{Output, Target};
 use super::analysis::Advice;
 use super::{Attempt, Error, JobInput, Product, Stages};
-use crate::flock::composite::params::{Format, Render};
-use crate::flock::{self, Flock, Params, plan_flock};
-use crate::formats::{flock_json, svg};
-use crate::ids::{FlockId, LibraryId};
-use crate::library::Library;
 use crate::store::jobs::Kind;
 use crate::store::jobs::finish::Source;
+use flockreel_core::flock::composite::params::{Format, Render};
+use flockreel_core::flock::{self, Flock, Params, plan_flock};
+use flockreel_core::formats::{flock_json, svg};
+use flockreel_core::ids::{FlockId, LibraryId};
+use flockreel_core::library::Library;
 
 /// Stages with their share of the running time; measured.
 pub const STAGES: Stages = &[

@@ -8,14 +8,14 @@ use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 
 use super::target::{Output, Target};
-use crate::flock::composite::params::Format;
-use crate::flock::{Flock, Shot};
-use crate::formats::flock_overlay::FlockOverlay;
-use crate::formats::ground_truth::{FilmShape, frame_name};
-use crate::formats::picture;
 use crate::jobs::Error;
 use crate::media::{Encoding, VideoFormat, VideoWriter};
-use crate::raster::{ColorSpec, Frame, RgbImage};
+use flockreel_core::flock::composite::params::Format;
+use flockreel_core::flock::{Flock, Shot};
+use flockreel_core::formats::flock_overlay::FlockOverlay;
+use flockreel_core::formats::ground_truth::{FilmShape, frame_name};
+use flockreel_core::formats::picture;
+use flockreel_core::raster::{ColorSpec, Frame, RgbImage};
 
 /// Maximum length of a preview (GIF and WebP), seconds. Free choice.
 const PREVIEW_S: f64 = 10.0;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::flock::composite::params::Format;
+use flockreel_core::flock::composite::params::Format;
 
 /// A file to write.
 #[derive(Clone, Debug, PartialEq, Eq)]

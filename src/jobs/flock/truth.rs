@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 
 use super::sink::remove_frames;
-use crate::flock::Flock;
-use crate::flock::composite::truth::FrameTruth;
-use crate::formats::ground_truth::coco::Coco;
-use crate::formats::ground_truth::{FilmShape, README, frame_name, mot, tracks};
-use crate::formats::picture;
+use flockreel_core::flock::Flock;
+use flockreel_core::flock::composite::truth::FrameTruth;
+use flockreel_core::formats::ground_truth::coco::Coco;
+use flockreel_core::formats::ground_truth::{FilmShape, README, frame_name, mot, tracks};
+use flockreel_core::formats::picture;
 
 /// Subfolders with one picture per frame.
 const MASKS: &str = "masks";

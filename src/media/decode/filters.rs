@@ -6,7 +6,7 @@ use super::selection::FrameSelection;
 use crate::media::gray_range::GrayRange;
 use crate::media::probe::Probe;
 use crate::media::probe::header::{Orientation, is_rgb};
-use crate::raster::{Matrix, Range};
+use flockreel_core::raster::{Matrix, Range};
 
 /// Returns the filter chain of a film in ffmpeg's syntax.
 pub(super) fn filters(

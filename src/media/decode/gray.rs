@@ -2,9 +2,9 @@
 
 use super::selection::FrameSelection;
 use super::{Film, MAX_SKIPPED_FRAMES};
-use crate::footage::spread_idx;
 use crate::media::error::Error;
 use crate::media::gray_range::{GrayRange, MIN_SAMPLED_FRAMES};
+use flockreel_core::footage::spread_idx;
 
 impl Film {
     /// Decodes frames spread over the film and returns the range of gray levels that they use.

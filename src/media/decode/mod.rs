@@ -24,10 +24,10 @@ use super::probe::{Probe, probe};
 use super::read_options::ReadOptions;
 use super::tools::{Tool, installed};
 use crate::config;
-use crate::footage::{
+use flockreel_core::footage::{
     FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_by_reading, spread_idx,
 };
-use crate::raster::Frame;
+use flockreel_core::raster::Frame;
 use selection::{FrameSelection, MAX_UNANNOUNCED_FRAMES};
 
 /// Largest number of frames that a child may decode without output. Free choice.

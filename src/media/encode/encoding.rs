@@ -6,7 +6,7 @@ use std::ffi::OsString;
 use std::path::Path;
 
 use super::{Quality, VideoFormat};
-use crate::raster::{Matrix, Range};
+use flockreel_core::raster::{Matrix, Range};
 
 /// An output format.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -20,8 +20,8 @@ use super::gate::Child;
 use super::invocation::Invocation;
 use super::limits::Limits;
 use super::tools::{Tool, installed};
-use crate::footage::FootageFormat;
-use crate::raster::{ColorSpec, Frame};
+use flockreel_core::footage::FootageFormat;
+use flockreel_core::raster::{ColorSpec, Frame};
 
 /// Properties common to all frames of a video.
 #[derive(Clone, Copy, Debug, PartialEq)]

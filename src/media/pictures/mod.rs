@@ -17,8 +17,10 @@ use super::probe::FULL_RANGE;
 use super::probe::header::square_pixels;
 use super::probe::timeline::{Claims, Timeline};
 use super::read_options::ReadOptions;
-use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_idx};
-use crate::raster::{Frame, RgbImage};
+use flockreel_core::footage::{
+    FootageFormat, FrameSource, FrameStream, SourceError, Visit, spread_idx,
+};
+use flockreel_core::raster::{Frame, RgbImage};
 use picture::Picture;
 use source::{Reader, Source};
 

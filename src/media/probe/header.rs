@@ -13,7 +13,7 @@ use crate::media::invocation::Invocation;
 use crate::media::limits::Limits;
 use crate::media::read_options::ReadOptions;
 use crate::media::tools::{Tool, installed};
-use crate::raster::{ColorSpec, Matrix, Range};
+use flockreel_core::raster::{ColorSpec, Matrix, Range};
 
 /// Accepted codecs, by ffprobe's names.
 const CODECS: [&str; 21] = [

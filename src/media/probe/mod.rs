@@ -23,8 +23,8 @@ use crate::media::error::{Damage, Error};
 use crate::media::limits::Limits;
 use crate::media::notice::Notice;
 use crate::media::read_options::ReadOptions;
-use crate::raster::{ColorSpec, Matrix, Range};
 use ending::Ending;
+use flockreel_core::raster::{ColorSpec, Matrix, Range};
 use header::{
     Orientation, alpha_decoder, check_codec, color_of, has_alpha, index_of, is_interlaced, number,
     orientation_of, ratio, read_header, shown_size, text, video_streams,

@@ -234,7 +234,7 @@ fn split_lines(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::code::Code;
+    use flockreel_core::code::Code;
 
     fn packets(lines: &str) -> Packets {
         let mut streams = Vec::new();

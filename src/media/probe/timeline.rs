@@ -260,7 +260,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::code::Code;
+    use flockreel_core::code::Code;
 
     fn fit(times_s: &[f64], claimed_fps: &[f64], tick_s: f64) -> Option<Timeline> {
         Timeline::fit(times_s, claimed_fps, tick_s, &Limits::default()).unwrap()

@@ -31,8 +31,8 @@ use draft::Drafts;
 use local::LocalFolder;
 
 use super::{Error, Store, Transaction, sql};
-use crate::code::Code;
 use crate::config::{FileStore, Storage};
+use flockreel_core::code::Code;
 
 /// Name of the file that holds the mark of the files (`identity`).
 const MARK: &str = "store-id";

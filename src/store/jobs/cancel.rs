@@ -2,9 +2,9 @@
 
 use super::JobState;
 use super::follow::cancel_followers;
-use crate::ids::JobId;
 use crate::store::owners::OwnerFilter;
 use crate::store::{Error, Store, sql};
+use flockreel_core::ids::JobId;
 
 /// Result of [`Store::cancel`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,9 +5,9 @@ use sqlx::types::Uuid;
 
 use super::follow::{cancel_followers, fail_followers};
 use super::{JobState, Kind};
-use crate::ids::JobId;
 use crate::store::owners::Account;
 use crate::store::{Error, Store, Transaction, sql};
+use flockreel_core::ids::JobId;
 
 /// Name of the notification about new jobs.
 const QUEUED: &str = "flockreel_jobs";
@@ -145,10 +145,10 @@ async fn is_queued_already(transaction: &mut Transaction, job: &NewJob) -> Resul
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::code::Code;
     use crate::store::fresh;
     use crate::store::jobs::Change;
     use crate::store::owners::OwnerFilter;
+    use flockreel_core::code::Code;
 
     fn job_after(after_job: Option<JobId>) -> NewJob {
         NewJob {

@@ -2,8 +2,8 @@
 
 use super::follow::{cancel_followers, fail_followers};
 use super::{Change, Lease};
-use crate::code::Code;
 use crate::store::{Error, Store, sql};
+use flockreel_core::code::Code;
 
 impl Store {
     /// Ends the job as failed, for an error that another attempt would repeat. `picture` is a JPEG that shows

@@ -3,8 +3,8 @@
 
 use sqlx::types::Uuid;
 
-use crate::code::Code;
 use crate::store::{Transaction, sql};
+use flockreel_core::code::Code;
 
 /// Cancels all jobs that depend on a cancelled job, directly or indirectly.
 pub(super) async fn cancel_followers(

@@ -30,7 +30,7 @@ use sqlx::types::Uuid;
 
 use super::Error;
 use super::resources::ResourceKind;
-use crate::ids::JobId;
+use flockreel_core::ids::JobId;
 
 /// Kinds of jobs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

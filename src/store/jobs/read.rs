@@ -3,10 +3,10 @@
 use sqlx::types::Uuid;
 
 use super::{JobState, Kind};
-use crate::code::Code;
-use crate::ids::JobId;
 use crate::store::owners::OwnerFilter;
 use crate::store::{Error, Store};
+use flockreel_core::code::Code;
+use flockreel_core::ids::JobId;
 
 /// Statement that selects the jobs of all owners as [`JobRow`]s. The table has the alias `r`.
 pub(super) const SELECT: &str = "select id, kind, state, result_id, cancel_requested, attempt, stage, \

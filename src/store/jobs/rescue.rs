@@ -6,9 +6,9 @@ use sqlx::types::Uuid;
 
 use super::JobState;
 use super::follow::{cancel_followers, fail_followers};
-use crate::code::Code;
-use crate::ids::JobId;
 use crate::store::{Error, Store, Transaction, sql};
+use flockreel_core::code::Code;
+use flockreel_core::ids::JobId;
 
 /// Number of crashes after which a job is quarantined. Free choice.
 const MAX_CRASHES: i64 = 2;

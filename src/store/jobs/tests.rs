@@ -8,11 +8,11 @@ use super::enqueue::NewJob;
 use super::finish::{Outcome, Source};
 use super::heartbeat::Beat;
 use super::*;
-use crate::code::Code;
 use crate::store::Store;
 use crate::store::owners::{Account, Owner, OwnerFilter};
 use crate::store::resources::Fish;
 use crate::store::{fresh, sql};
+use flockreel_core::code::Code;
 
 const LEASE_MS: i64 = 15_000;
 

@@ -269,7 +269,7 @@ mod tests {
     use std::borrow::Cow;
 
     use super::*;
-    use crate::code::Code;
+    use flockreel_core::code::Code;
 
     #[tokio::test]
     async fn connection_after_a_rollback_by_sqlite_is_replaced() {

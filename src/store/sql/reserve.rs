@@ -12,8 +12,8 @@ use rustix::io::Errno;
 use tokio::sync::Mutex;
 use tokio::task::spawn_blocking;
 
-use crate::code::Code;
 use crate::store::Error;
+use flockreel_core::code::Code;
 
 /// Size of the reserve, bytes: twice the size that SQLite's write-ahead log reaches between two checkpoints
 /// (1000 pages of 4 KiB). One half is for the log, the other for the pages that it moves into the database.

@@ -4,7 +4,7 @@
 
 use std::time::{Duration, Instant};
 
-use flockreel::code::Code;
+use flockreel_core::code::Code;
 use serde_json::{Value, json};
 
 use crate::common::TestApp;

@@ -2,9 +2,9 @@
 
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::jobs::{Attempt, Error, Product};
-use flockreel::progress::Progress;
 use flockreel::store::jobs::Lease;
 use flockreel::store::jobs::finish::Source;
+use flockreel_core::progress::Progress;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 

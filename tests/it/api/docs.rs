@@ -1,7 +1,7 @@
 //! The documentation pages. Every error code is explained at the URL that its problem documents name. The
 //! API description loads only files of the service. `tests/page` tests both in a browser.
 
-use flockreel::code::Code;
+use flockreel_core::code::Code;
 use serde_json::Value;
 
 use crate::common::TestApp;

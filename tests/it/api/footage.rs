@@ -137,7 +137,8 @@ async fn a_form_must_hold_a_video_and_nothing_unknown() {
 #[tokio::test]
 async fn a_background_of_another_size_is_refused() {
     let app = TestApp::idle().await;
-    let picture = flockreel::formats::picture::write_rgb(&flockreel::raster::RgbImage::new(32, 64));
+    let picture =
+        flockreel_core::formats::picture::write_rgb(&flockreel_core::raster::RgbImage::new(32, 64));
     let form = Form::new()
         .part("video", Part::bytes(TINY.clone()))
         .part("background", Part::bytes(picture));

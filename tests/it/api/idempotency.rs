@@ -1,12 +1,12 @@
 //! Idempotency-Key: a repeated request has one effect and gets the first response again.
 
-use flockreel::ids::FootageId;
 use flockreel::jobs::clock::now_ms;
 use flockreel::jobs::supervisor::recover;
 use flockreel::jobs::{IdSequence, analysis};
 use flockreel::store::idempotency::{Begun, Scope};
 use flockreel::store::owners::{Account, Owner};
 use flockreel::store::tokens::{NewToken, Scope as TokenScope};
+use flockreel_core::ids::FootageId;
 use reqwest::{Response, StatusCode};
 use serde_json::{Value, json};
 
@@ -98,7 +98,7 @@ async fn crashed_between(app: &TestApp, footage: &str) -> Value {
     };
     let input = analysis::Input {
         footage_id: FootageId(footage.parse().unwrap()),
-        params: flockreel::analysis::Params::default(),
+        params: flockreel_core::analysis::Params::default(),
     };
     let account = Account::local();
     let mut ids = IdSequence::derived_from(base_id);

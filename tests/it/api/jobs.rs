@@ -7,10 +7,10 @@ use crate::common::TestApp;
 use crate::common::app::{code_of, json_of};
 use crate::common::clip::TINY;
 use crate::common::film::Films;
-use flockreel::code::Code;
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::media;
 use flockreel::store::tokens::Scope;
+use flockreel_core::code::Code;
 
 async fn queued(app: &TestApp) -> Value {
     let footage_id = app.upload(&TINY).await;

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use serde_json::{Map, Value, json};
 
-use flockreel::formats::params::{Error, read};
-use flockreel::parameters::Parameters;
-use flockreel::{analysis, fish, flock};
+use flockreel_core::formats::params::{Error, read};
+use flockreel_core::parameters::Parameters;
+use flockreel_core::{analysis, fish, flock};
 
 use crate::common::TestApp;
 

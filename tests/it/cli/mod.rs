@@ -7,7 +7,7 @@ mod upkeep;
 
 use std::process::{Command, Output};
 
-use flockreel::code::Code;
+use flockreel_core::code::Code;
 
 use crate::common::client;
 use crate::common::film::Films;

@@ -224,7 +224,7 @@ pub(crate) async fn code_of(answer: Response, status: u16) -> String {
     let (url, code) = (&problem["type"], problem["code"].as_str().unwrap());
     assert_eq!(url, &format!("/docs/errors#{code}"));
     assert!(problem["title"].is_string() && problem["detail"].is_string());
-    let advice = flockreel::code::Code::from_name(code).map(|code| code.advice());
+    let advice = flockreel_core::code::Code::from_name(code).map(|code| code.advice());
     assert_eq!(problem["advice"].as_str(), advice);
     code.to_owned()
 }

@@ -2,11 +2,11 @@
 
 use std::sync::LazyLock;
 
-use flockreel::fish::film::Film;
-use flockreel::fish::sample::{SampleFilm, SampleParams};
-use flockreel::footage::{FootageFormat, FrameSource};
 use flockreel::media::VideoWriter;
-use flockreel::raster::{Frame, RgbImage};
+use flockreel_core::fish::film::Film;
+use flockreel_core::fish::sample::{SampleFilm, SampleParams};
+use flockreel_core::footage::{FootageFormat, FrameSource};
+use flockreel_core::raster::{Frame, RgbImage};
 
 /// Ten frames of 64 x 64 pixels, enough to be admitted as footage.
 pub(crate) static TINY: LazyLock<Vec<u8>> = LazyLock::new(|| film(10, 64, 64));

@@ -4,14 +4,14 @@
 
 use std::sync::Arc;
 
-use flockreel::analysis::analyze;
-use flockreel::cpu::Level;
-use flockreel::flock::{self, plan_flock};
-use flockreel::formats::poses_json;
-use flockreel::geometry::wrap_rad;
-use flockreel::library::{Library, Pose};
-use flockreel::progress::Silent;
-use flockreel::scratch::{InMemory, Scratch};
+use flockreel_core::analysis::analyze;
+use flockreel_core::cpu::Level;
+use flockreel_core::flock::{self, plan_flock};
+use flockreel_core::formats::poses_json;
+use flockreel_core::geometry::wrap_rad;
+use flockreel_core::library::{Library, Pose};
+use flockreel_core::progress::Silent;
+use flockreel_core::scratch::{InMemory, Scratch};
 
 use super::sample::{filmed, median};
 

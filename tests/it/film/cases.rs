@@ -1,12 +1,12 @@
 //! Common faults of films: the analysis copes with them, or refuses the film for the right reason.
 
-use flockreel::analysis::{Error, Params};
-use flockreel::library::MoverKind;
+use flockreel_core::analysis::{Error, Params};
+use flockreel_core::library::MoverKind;
 
 use super::staged::{FPS, HEIGHT, N_FRAMES, Staged, WIDTH, put};
 
 /// Analyzes the film with default parameters, checks the poses against the truth and returns the library.
-fn measured(name: &str, film: &Staged) -> flockreel::library::Library {
+fn measured(name: &str, film: &Staged) -> flockreel_core::library::Library {
     let library = film.analyzed(&Params::default());
     let library = library.unwrap_or_else(|error| panic!("{name}: {error}"));
     film.check(name, &library);

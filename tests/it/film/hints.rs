@@ -1,9 +1,9 @@
 //! ReadOptions of the user: the part of the film to analyze, a point on the animal, and boxes to ignore.
 
-use flockreel::analysis::params::{AnimalAtParam, IgnoreParam};
-use flockreel::analysis::{Error, Params};
-use flockreel::footage::{FrameSource, Part};
-use flockreel::raster::Frame;
+use flockreel_core::analysis::params::{AnimalAtParam, IgnoreParam};
+use flockreel_core::analysis::{Error, Params};
+use flockreel_core::footage::{FrameSource, Part};
+use flockreel_core::raster::Frame;
 
 use super::staged::{HEIGHT, N_FRAMES, Staged, WIDTH, put};
 

@@ -5,13 +5,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use flockreel::analysis::{Error, Params, analyze};
-use flockreel::cpu::Level;
-use flockreel::footage::Part;
-use flockreel::library::Library;
 use flockreel::media::{Limits, Video};
-use flockreel::progress::Silent;
-use flockreel::scratch::{InMemory, Scratch};
+use flockreel_core::analysis::{Error, Params, analyze};
+use flockreel_core::cpu::Level;
+use flockreel_core::footage::Part;
+use flockreel_core::library::Library;
+use flockreel_core::progress::Silent;
+use flockreel_core::scratch::{InMemory, Scratch};
 use serde_json::Value;
 
 use crate::common::film::footage;

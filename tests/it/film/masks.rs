@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use flockreel::analysis::{Error, Params, analyze};
-use flockreel::code::Code;
-use flockreel::cpu::Level;
-use flockreel::fish::film::Film;
-use flockreel::footage::Masked;
-use flockreel::library::Library;
-use flockreel::progress::Silent;
-use flockreel::raster::RgbImage;
-use flockreel::scratch::{InMemory, Scratch};
+use flockreel_core::analysis::{Error, Params, analyze};
+use flockreel_core::code::Code;
+use flockreel_core::cpu::Level;
+use flockreel_core::fish::film::Film;
+use flockreel_core::footage::Masked;
+use flockreel_core::library::Library;
+use flockreel_core::progress::Silent;
+use flockreel_core::raster::RgbImage;
+use flockreel_core::scratch::{InMemory, Scratch};
 
 use super::staged::{HEIGHT, N_FRAMES, Staged, WIDTH, put};
 
@@ -145,6 +145,6 @@ fn masks_of_another_number_or_size_or_without_an_animal_are_refused() {
     let more = (0..N_FRAMES).chain(0..3).collect();
     assert_eq!(code(&Staged::in_order(more)), Code::MasksDiffer);
     assert_eq!(code(&masks(&fish, true)), Code::MasksEmpty);
-    let part = flockreel::footage::Part::new(&masks_of, None, None);
+    let part = flockreel_core::footage::Part::new(&masks_of, None, None);
     assert!(Masked::new(&film, &part, true).is_ok());
 }

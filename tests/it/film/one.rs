@@ -3,13 +3,13 @@
 //! of 255 levels over the film, and below 1.5 in every frame. It includes the errors of chroma subsampling,
 //! matte and background; the film has no noise. One interpolation too many gives an error of 1.6.
 
-use flockreel::flock::lens::Lens;
-use flockreel::flock::{
+use flockreel_core::flock::lens::Lens;
+use flockreel_core::flock::{
     BoidTrack, Compositor, Flock, Individual, Params, PlanCost, Shot, Space, Stats,
 };
-use flockreel::footage::FrameSource;
-use flockreel::library::Library;
-use flockreel::raster::{Frame, RgbImage};
+use flockreel_core::footage::FrameSource;
+use flockreel_core::library::Library;
+use flockreel_core::raster::{Frame, RgbImage};
 
 use super::sample::filmed_without_noise;
 

@@ -2,10 +2,10 @@
 
 use std::process::Command;
 
-use flockreel::fish::sample::{SampleFilm, SampleParams};
-use flockreel::footage::FrameSource;
 use flockreel::media::{VideoFormat, VideoWriter};
-use flockreel::raster::Frame;
+use flockreel_core::fish::sample::{SampleFilm, SampleParams};
+use flockreel_core::footage::FrameSource;
+use flockreel_core::raster::Frame;
 use serde_json::Value;
 
 use crate::common::film::Films;

@@ -2,9 +2,9 @@
 //! In a film without noise, the mean absolute error in the animal's box is below 1.5 of 255 levels. The
 //! matte's pixels are those of the frame, so nothing is interpolated.
 
-use flockreel::footage::FrameSource;
-use flockreel::library::{Library, Pose};
-use flockreel::raster::{Frame, RgbImage};
+use flockreel_core::footage::FrameSource;
+use flockreel_core::library::{Library, Pose};
+use flockreel_core::raster::{Frame, RgbImage};
 
 use super::sample::filmed_without_noise;
 

@@ -5,18 +5,18 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::{Arc, OnceLock};
 
-use flockreel::analysis::params::{AnimalParams, CameraParams};
-use flockreel::analysis::{self, analyze};
-use flockreel::cpu::Level;
-use flockreel::fish::sample::{SampleFilm, SampleParams};
-use flockreel::fish::{Params, drive};
-use flockreel::footage::FrameSource;
-use flockreel::formats::library_dir;
-use flockreel::formats::library_json::FootageSummary;
-use flockreel::library::Library;
 use flockreel::media::{Limits, Video};
-use flockreel::progress::Silent;
-use flockreel::scratch::{InMemory, Scratch};
+use flockreel_core::analysis::params::{AnimalParams, CameraParams};
+use flockreel_core::analysis::{self, analyze};
+use flockreel_core::cpu::Level;
+use flockreel_core::fish::sample::{SampleFilm, SampleParams};
+use flockreel_core::fish::{Params, drive};
+use flockreel_core::footage::FrameSource;
+use flockreel_core::formats::library_dir;
+use flockreel_core::formats::library_json::FootageSummary;
+use flockreel_core::library::Library;
+use flockreel_core::progress::Silent;
+use flockreel_core::scratch::{InMemory, Scratch};
 
 const N_FRAMES: usize = 180;
 
@@ -88,7 +88,10 @@ fn the_virtual_fish_swims_where_the_filmed_one_swam() {
     let seen: Vec<_> = both.filter(|(got, _)| got.visible).collect();
     assert!(seen.len() > N_FRAMES * 9 / 10, "visible in {}", seen.len());
     let camera = &film.motion().camera;
-    let gap_px = |(got, want): &(&flockreel::fish::Posture, &flockreel::fish::Posture)| {
+    let gap_px = |(got, want): &(
+        &flockreel_core::fish::Posture,
+        &flockreel_core::fish::Posture,
+    )| {
         let [a, b] = [got, want].map(|p| camera.image_from_camera(p.position_m.to_array()));
         (a[0] - b[0]).hypot(a[1] - b[1])
     };
@@ -133,6 +136,38 @@ fn the_commands_write_a_film_of_both_fish_and_a_model() {
 }
 
 #[test]
+fn changed_plan_is_refused_with_its_fault() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    library_on_disk(&dir.path().join("library"));
+    let (library, picture, plan) = (at("library"), at("flock.png"), at("flock.json"));
+    let size = ["--count", "2", "--frames", "50", "--plan", &plan];
+    let made = flockreel(&[&["flock", &library, "-o", &picture], &size[..]].concat());
+    assert!(made.status.success(), "{made:?}");
+    let check = || flockreel(&["check-plan", &library, &plan, "--json"]);
+    let said = String::from_utf8(check().stdout).unwrap();
+    assert!(
+        said.contains("\"individuals\":2") && said.contains("\"frames\":100"),
+        "{said}"
+    );
+
+    let text = std::fs::read_to_string(&plan).unwrap();
+    let total = text.rfind("\"total\":").expect("a cost") + 8;
+    let end = total + text[total..].find(',').expect("more costs");
+    std::fs::write(&plan, format!("{}0.0{}", &text[..total], &text[end..])).unwrap();
+    let refused = check();
+    assert_eq!(refused.status.code(), Some(2));
+    let sentence = String::from_utf8(refused.stderr).unwrap();
+    assert!(
+        sentence.contains("individual 1: cost.total or its parts are not "),
+        "{sentence}"
+    );
+
+    std::fs::write(&plan, "{}").unwrap();
+    assert_eq!(check().status.code(), Some(2));
+}
+
+#[test]
 fn the_sample_command_writes_footage_with_a_true_pose_for_every_frame() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name).display().to_string();
@@ -148,7 +183,7 @@ fn the_sample_command_writes_footage_with_a_true_pose_for_every_frame() {
         (format.width, format.height, format.n_frames_hint),
         (320, 240, 12)
     );
-    let poses = flockreel::formats::poses_json::read(&std::fs::read(&truth).unwrap()).unwrap();
+    let poses = flockreel_core::formats::poses_json::read(&std::fs::read(&truth).unwrap()).unwrap();
     assert_eq!(poses.frames.len(), 12);
     assert!(poses.frames.iter().all(|pose| pose.position_m.is_some()));
 }

@@ -3,16 +3,16 @@
 
 use std::sync::Arc;
 
-use flockreel::analysis::{Error, Params, analyze};
-use flockreel::cpu::Level;
-use flockreel::fish::motion::Motion;
-use flockreel::fish::sample::{SampleFilm, SampleParams};
-use flockreel::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
-use flockreel::geometry::wrap_rad;
-use flockreel::library::Library;
-use flockreel::progress::Silent;
-use flockreel::raster::{Frame, RgbImage};
-use flockreel::scratch::{InMemory, Scratch};
+use flockreel_core::analysis::{Error, Params, analyze};
+use flockreel_core::cpu::Level;
+use flockreel_core::fish::motion::Motion;
+use flockreel_core::fish::sample::{SampleFilm, SampleParams};
+use flockreel_core::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
+use flockreel_core::geometry::wrap_rad;
+use flockreel_core::library::Library;
+use flockreel_core::progress::Silent;
+use flockreel_core::raster::{Frame, RgbImage};
+use flockreel_core::scratch::{InMemory, Scratch};
 
 /// Number of frames of the unedited film.
 pub(super) const N_FRAMES: usize = 150;

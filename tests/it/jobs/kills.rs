@@ -4,11 +4,11 @@
 use std::time::{Duration, Instant};
 
 use flockreel::jobs::clock::now_ms;
-use flockreel::random::uniform;
 use flockreel::store::Store;
 use flockreel::store::jobs::JobState;
 use flockreel::store::jobs::read::JobRow;
 use flockreel::store::owners::OwnerFilter;
+use flockreel_core::random::uniform;
 use futures_util::StreamExt;
 use futures_util::stream::once;
 use reqwest::StatusCode;

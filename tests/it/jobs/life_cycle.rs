@@ -150,7 +150,7 @@ async fn a_film_that_cannot_be_measured_fails_with_its_reason() {
     assert_eq!(job["state"], "failed");
     let code = job["error"]["code"].as_str().unwrap();
     assert!(
-        flockreel::code::Code::from_name(code).is_some() && code != "internal",
+        flockreel_core::code::Code::from_name(code).is_some() && code != "internal",
         "{job}"
     );
     let library = format!("/v1/libraries/{}", analysis["library_id"].as_str().unwrap());

@@ -4,7 +4,6 @@
 
 use std::process::{Command, Stdio};
 
-use flockreel::ids::JobId;
 use flockreel::store::Store;
 use flockreel::store::footage::{Added, Footage, VIDEO};
 use flockreel::store::jobs::enqueue::NewJob;
@@ -12,6 +11,7 @@ use flockreel::store::jobs::finish::{Outcome, Source};
 use flockreel::store::jobs::{Change, JobState, Kind};
 use flockreel::store::owners::{Account, Owner, OwnerFilter};
 use flockreel::store::resources::Fish;
+use flockreel_core::ids::JobId;
 use uuid::Uuid;
 
 use crate::common::Place;

@@ -1,10 +1,10 @@
 //! The sample of a new data folder: three ordinary jobs that film, analyze and make a flock.
 
-use flockreel::ids::{FootageId, JobId};
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::jobs::{IdSequence, analysis, run, sample};
-use flockreel::progress::Progress;
 use flockreel::store::owners::Account;
+use flockreel_core::ids::{FootageId, JobId};
+use flockreel_core::progress::Progress;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 

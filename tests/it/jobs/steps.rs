@@ -4,15 +4,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use flockreel::code::Code;
-use flockreel::ids::JobId;
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::jobs::{Attempt, Error, Product};
-use flockreel::progress::Progress;
 use flockreel::store::jobs::JobState;
 use flockreel::store::jobs::cancel::Cancel;
 use flockreel::store::jobs::finish::Source;
 use flockreel::store::owners::OwnerFilter;
+use flockreel_core::code::Code;
+use flockreel_core::ids::JobId;
+use flockreel_core::progress::Progress;
 use serde_json::json;
 
 use crate::common::TestApp;
@@ -139,7 +139,7 @@ async fn a_panic_fails_its_own_job_alone() {
     let step = worker.step_by(|_, _| panic!("as a test wants it")).await;
     assert_eq!(
         step.unwrap(),
-        Step::Failed(job, flockreel::code::Code::Internal)
+        Step::Failed(job, flockreel_core::code::Code::Internal)
     );
     assert_eq!(worker.step().await.unwrap(), Step::Idle);
     app.assert_sound().await;

@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use flockreel::jobs::clock::now_ms;
-use flockreel::random::uniform;
 use flockreel::store::Store;
+use flockreel_core::random::uniform;
 use serde_json::Value;
 use tokio::sync::Mutex;
 

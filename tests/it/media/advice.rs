@@ -3,9 +3,9 @@
 
 use std::path::{Path, PathBuf};
 
-use flockreel::code::Code;
 use flockreel::jobs::masks::Masks;
 use flockreel::media::{Limits, ReadOptions, Video};
+use flockreel_core::code::Code;
 
 use super::{read_all, read_whole};
 use crate::common::film::Films;

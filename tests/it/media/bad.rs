@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use flockreel::code::Code;
 use flockreel::media::Limits;
+use flockreel_core::code::Code;
 
 use super::{n_processes_with, read_whole};
 use crate::common::film::Films;
@@ -250,8 +250,8 @@ fn dropped_reader_leaves_no_decoder() {
     let film = films.test_picture("320x240", 500, "-c:v libx264 -pix_fmt yuv420p long.mp4");
     let name = film.display().to_string();
     let video = flockreel::media::Video::open(&film, &Limits::default()).expect("a good film");
-    let mut stream = flockreel::footage::FrameSource::open(&video).expect("a decoder");
-    let mut frame = flockreel::raster::Frame::default();
+    let mut stream = flockreel_core::footage::FrameSource::open(&video).expect("a decoder");
+    let mut frame = flockreel_core::raster::Frame::default();
     stream.next_frame(&mut frame).expect("a first frame");
     assert_eq!(n_processes_with(&name), 1);
     drop(stream);

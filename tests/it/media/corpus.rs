@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use flockreel::code::Code;
+use flockreel_core::code::Code;
 
 use super::bad::PLAYLISTS;
 use crate::common::film::Films;

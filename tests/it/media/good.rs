@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use flockreel::footage::{FrameSource, spread_idx};
 use flockreel::media::{Limits, Video};
-use flockreel::raster::{Frame, Matrix, Range};
+use flockreel_core::footage::{FrameSource, spread_idx};
+use flockreel_core::raster::{Frame, Matrix, Range};
 
 use super::{read_all, read_whole};
 use crate::common::film::Films;

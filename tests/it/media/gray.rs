@@ -1,7 +1,7 @@
 //! Gray films of more than 8 bits: the used range is stretched to black and white, and a note reports it.
 
-use flockreel::footage::FrameSource;
 use flockreel::media::{Limits, Notice, Video};
+use flockreel_core::footage::FrameSource;
 
 use super::read_all;
 use crate::common::film::Films;

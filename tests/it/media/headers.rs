@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use flockreel::code::Code;
-use flockreel::footage::FrameSource;
 use flockreel::media::{Limits, Notice, ReadOptions, Video};
+use flockreel_core::code::Code;
+use flockreel_core::footage::FrameSource;
 
 use super::{read_all, read_whole};
 use crate::common::film::Films;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use flockreel::media::{Encoding, VideoFormat, VideoWriter};
-use flockreel::raster::{ColorSpec, Frame};
+use flockreel_core::raster::{ColorSpec, Frame};
 
 use crate::common::film::Films;
 
@@ -15,8 +15,8 @@ const FORMAT: VideoFormat = VideoFormat {
     height: 66,
     fps: 30000.0 / 1001.0,
     color: ColorSpec {
-        matrix: flockreel::raster::Matrix::Bt601,
-        range: flockreel::raster::Range::Limited,
+        matrix: flockreel_core::raster::Matrix::Bt601,
+        range: flockreel_core::raster::Range::Limited,
     },
 };
 

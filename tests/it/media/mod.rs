@@ -18,10 +18,10 @@ mod written;
 
 use std::path::Path;
 
-use flockreel::code::Code;
-use flockreel::footage::{FrameSource, SourceError};
 use flockreel::media::{Limits, Video};
-use flockreel::raster::Frame;
+use flockreel_core::code::Code;
+use flockreel_core::footage::{FrameSource, SourceError};
+use flockreel_core::raster::Frame;
 
 /// Returns all frames of a film with their times, or the code with which opening or reading is refused.
 fn read_whole(path: &Path, limits: &Limits) -> Result<Vec<(f64, Frame)>, Code> {

@@ -3,9 +3,9 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flockreel::code::Code;
-use flockreel::footage::{FrameSource, spread_idx};
 use flockreel::media::{Limits, Notice, ReadOptions, Video};
+use flockreel_core::code::Code;
+use flockreel_core::footage::{FrameSource, spread_idx};
 use image::{GrayImage, ImageFormat};
 use tiff::encoder::colortype;
 
@@ -69,7 +69,7 @@ fn folders_zips_and_stacks_are_read_in_numeric_order() {
             assert!(u.iter().chain(v).all(|&chroma| chroma == 128));
         }
         let mut spread = Vec::new();
-        let mut visit = |frame: &flockreel::raster::Frame| {
+        let mut visit = |frame: &flockreel_core::raster::Frame| {
             spread.push(frame.clone());
             ControlFlow::Continue(())
         };

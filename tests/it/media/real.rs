@@ -1,9 +1,9 @@
 //! Real recordings are decoded completely, with the expected size, frame rate and number of frames.
 //! FLOCKREEL_FOOTAGE names the folder of recordings, which are not in the repository.
 
-use flockreel::footage::FrameSource;
 use flockreel::media::{Limits, Video};
-use flockreel::raster::{Frame, Range};
+use flockreel_core::footage::FrameSource;
+use flockreel_core::raster::{Frame, Range};
 
 use crate::common::film::footage;
 

@@ -3,9 +3,9 @@
 use std::process::Command;
 use std::time::Instant;
 
-use flockreel::footage::FrameSource;
 use flockreel::media::{Limits, Video, VideoWriter};
-use flockreel::raster::Frame;
+use flockreel_core::footage::FrameSource;
+use flockreel_core::raster::Frame;
 
 use crate::common::film::Films;
 

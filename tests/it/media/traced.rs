@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use flockreel::code::Code;
 use flockreel::media::{Layers, Limits, Video};
+use flockreel_core::code::Code;
 
 use super::corpus::{Case, corpus};
 use super::read_all;

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use flockreel::code::Code;
-use flockreel::footage::FrameSource;
 use flockreel::media::{Encoding, Limits, Quality, Video, VideoFormat, VideoWriter};
-use flockreel::raster::{ColorSpec, Frame, Matrix, Range};
+use flockreel_core::code::Code;
+use flockreel_core::footage::FrameSource;
+use flockreel_core::raster::{ColorSpec, Frame, Matrix, Range};
 
 use super::{n_processes_with, read_all};
 use crate::common::film::Films;

@@ -3,14 +3,14 @@
 
 use std::time::{Duration, Instant};
 
-use flockreel::analysis::Params;
-use flockreel::ids::FootageId;
 use flockreel::jobs::clock::now_ms;
 use flockreel::jobs::{Context, IdSequence, analysis};
 use flockreel::store::Store;
 use flockreel::store::jobs::JobState;
 use flockreel::store::owners::{Account, OwnerFilter};
 use flockreel::store::resources::Library;
+use flockreel_core::analysis::Params;
+use flockreel_core::ids::FootageId;
 use rustix::process::Signal;
 
 use super::machines::admitted;

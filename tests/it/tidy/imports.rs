@@ -35,10 +35,15 @@ pub(super) fn may_use(file: &str, module: &str, used: &str) -> bool {
         }
 }
 
-/// The modules named after `crate::`, by a path or at the top of a group.
+/// Returns the modules of this repository that the code names after its crate, by a path or at the top of a
+/// group.
 pub(super) fn modules_used(code: &str) -> Vec<String> {
     let mut modules = Vec::new();
-    for rest in code.split("crate::").skip(1) {
+    for rest in code
+        .replace("flockreel_core::", "crate::")
+        .split("crate::")
+        .skip(1)
+    {
         match rest.strip_prefix('{') {
             Some(group) => modules.extend(top_of_group(group)),
             None => modules.push(first_name(rest)),
@@ -73,8 +78,9 @@ fn first_name(text: &str) -> String {
 
 #[test]
 fn imports_are_found_in_paths_and_in_groups() {
-    let code = "use crate::{geometry::{Rect, Camera}, store};\nlet job = crate::jobs::Job;\n";
-    assert_eq!(modules_used(code), ["geometry", "store", "jobs"]);
+    let code =
+        "use flockreel_core::{geometry::{Rect, Camera}, order};\nlet job = crate::jobs::Job;\n";
+    assert_eq!(modules_used(code), ["geometry", "order", "jobs"]);
 }
 
 #[test]

@@ -42,11 +42,19 @@ pub(super) fn assert_no(faults: Vec<String>) {
     assert!(faults.is_empty(), "\n{}\n", faults.join("\n"));
 }
 
-pub(super) fn rust_files(folder: &str) -> Vec<String> {
-    files(folder)
-        .into_iter()
-        .filter(|file| file.ends_with(".rs"))
-        .collect()
+/// The source folders of the packages.
+pub(super) const SOURCES: [&str; 2] = ["crates/flockreel-core/src", "src"];
+
+/// Returns the source files of all packages, in order.
+pub(super) fn sources() -> Vec<String> {
+    let all = SOURCES.iter().flat_map(|folder| files(folder));
+    all.filter(|file| file.ends_with(".rs")).collect()
+}
+
+/// Returns the path of a source file below the `src` of its package, such as `media/gate.rs`.
+pub(super) fn within_package(file: &str) -> &str {
+    let parts = SOURCES.iter().find_map(|folder| file.strip_prefix(folder));
+    parts.map_or(file, |rest| rest.trim_start_matches('/'))
 }
 
 /// Every text file of ours below a folder, in order, as a path from the root of the repository.

@@ -9,7 +9,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use flockreel::media::{Encoding, Layer, Layers, Limits, Quality, Video, VideoFormat, VideoWriter};
-use flockreel::raster::{ColorSpec, Frame};
+use flockreel_core::raster::{ColorSpec, Frame};
 
 use super::n_processes_with;
 use crate::common::film::Films;

@@ -12,17 +12,17 @@ mod timing;
 use std::path::Path;
 use std::sync::Arc;
 
-use flockreel::cpu::Level;
-use flockreel::flock::lens::Lens;
-use flockreel::flock::motion::motion_of;
-use flockreel::flock::plan::{Model, Planner};
-use flockreel::flock::{BoidTrack, Params, Stats, plan_flock};
-use flockreel::formats::library_dir;
-use flockreel::library::{Jump, Library, LibraryStats, Playback, Pose, Sprites};
-use flockreel::progress::Silent;
-use flockreel::random::uniform;
-use flockreel::raster::RgbImage;
-use flockreel::scratch::InMemory;
+use flockreel_core::cpu::Level;
+use flockreel_core::flock::lens::Lens;
+use flockreel_core::flock::motion::motion_of;
+use flockreel_core::flock::plan::{Model, Planner};
+use flockreel_core::flock::{BoidTrack, Params, Stats, plan_flock};
+use flockreel_core::formats::library_dir;
+use flockreel_core::library::{Jump, Library, LibraryStats, Playback, Pose, Sprites};
+use flockreel_core::progress::Silent;
+use flockreel_core::random::uniform;
+use flockreel_core::raster::RgbImage;
+use flockreel_core::scratch::InMemory;
 
 fn main() {
     let (flags, arguments): (Vec<String>, Vec<String>) =

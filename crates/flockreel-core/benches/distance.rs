@@ -16,15 +16,17 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use flockreel::analysis::Params;
-use flockreel::analysis::params::Planes;
-use flockreel::analysis::similarity::distance::{ComparedSprites, DistanceMatrix, Distances, Side};
-use flockreel::cpu::Level;
-use flockreel::formats::npy;
-use flockreel::library::{Pose, Poses, Sprites};
-use flockreel::progress::Silent;
-use flockreel::random;
-use flockreel::scratch::{Full, InMemory};
+use flockreel_core::analysis::Params;
+use flockreel_core::analysis::params::Planes;
+use flockreel_core::analysis::similarity::distance::{
+    ComparedSprites, DistanceMatrix, Distances, Side,
+};
+use flockreel_core::cpu::Level;
+use flockreel_core::formats::npy;
+use flockreel_core::library::{Pose, Poses, Sprites};
+use flockreel_core::progress::Silent;
+use flockreel_core::random;
+use flockreel_core::scratch::{Full, InMemory};
 
 fn main() {
     let arguments: Vec<String> = timing::arguments().collect();

@@ -6,11 +6,11 @@
 
 mod timing;
 
-use flockreel::flock::Params;
-use flockreel::flock::boids::Boids;
-use flockreel::flock::boids::calibration::Calibration;
-use flockreel::flock::boids::tank::Tank;
-use flockreel::flock::lens::Lens;
+use flockreel_core::flock::Params;
+use flockreel_core::flock::boids::Boids;
+use flockreel_core::flock::boids::calibration::Calibration;
+use flockreel_core::flock::boids::tank::Tank;
+use flockreel_core::flock::lens::Lens;
 
 /// Area of the tank per boid, square body lengths.
 const AREA_PER_BOID_BL2: f64 = 1.5;

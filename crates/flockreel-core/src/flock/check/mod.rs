@@ -31,14 +31,14 @@ const TOLERANCE_RAD: f64 = 2e-5;
 /// frames, counted from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{message} ({code})")]
-pub(crate) struct Violation {
+pub struct Violation {
     code: &'static str,
     message: String,
 }
 
 /// Checks every individual of a flock. Returns the number of jumps, or the first violation. Reports the
 /// stage `checking`.
-pub(crate) fn check(
+pub fn check(
     library: &Library,
     flock: &Flock,
     progress: &dyn Progress,

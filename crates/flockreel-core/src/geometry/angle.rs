@@ -8,7 +8,7 @@ use std::f64::consts::{PI, TAU};
 /// Returns the angle wrapped to (-pi, pi].
 ///
 /// ```
-/// use flockreel::geometry::wrap_rad;
+/// use flockreel_core::geometry::wrap_rad;
 /// assert!((wrap_rad(3.5 * std::f64::consts::PI) + 0.5 * std::f64::consts::PI).abs() < 1e-12);
 /// assert_eq!(wrap_rad(-std::f64::consts::PI), std::f64::consts::PI);
 /// ```

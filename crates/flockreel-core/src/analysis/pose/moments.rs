@@ -33,8 +33,8 @@ pub struct Moments {
 /// Returns the moments of weights 0..=255 over a box; `None` when all are zero.
 ///
 /// ```
-/// use flockreel::analysis::pose::moments::moments;
-/// use flockreel::geometry::Rect;
+/// use flockreel_core::analysis::pose::moments::moments;
+/// use flockreel_core::geometry::Rect;
 /// let bar = moments(Rect { x: 10, y: 20, w: 4, h: 1 }, &[255; 4]).unwrap();
 /// assert_eq!((bar.centroid_px, bar.major_rad), ([12.0, 20.5], Some(0.0)));
 /// ```

@@ -1,6 +1,6 @@
 //! Poses of a film from the side, for the benchmarks.
 
-use flockreel::library::{Pose, Poses, View};
+use flockreel_core::library::{Pose, Poses, View};
 
 /// Returns poses of 640 x 480 pixels at 30 frames per second.
 pub(crate) fn from_the_side(frames: Vec<Pose>) -> Poses {

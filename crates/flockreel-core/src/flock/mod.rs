@@ -6,7 +6,7 @@
 
 pub mod advice;
 pub mod boids;
-pub(crate) mod check;
+pub mod check;
 pub mod composite;
 mod course;
 mod density;

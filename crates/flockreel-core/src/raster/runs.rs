@@ -47,7 +47,7 @@ impl Component {
     /// Returns the centroid of the pixel centers, pixels. Integer sums along the runs make it exact.
     ///
     /// ```
-    /// use flockreel::{geometry::Rect, raster::{Mask, runs::components}};
+    /// use flockreel_core::{geometry::Rect, raster::{Mask, runs::components}};
     /// let mask = Mask { rect: Rect::of_size(3, 2), bits: vec![1, 0, 0, 0, 1, 0] };
     /// assert_eq!(components(&mask)[0].centroid_px(), [1.0, 1.0]);
     /// ```
@@ -67,7 +67,7 @@ impl Component {
 ///
 /// Pixels that touch at a corner are connected:
 /// ```
-/// use flockreel::{geometry::Rect, raster::{Mask, runs::components}};
+/// use flockreel_core::{geometry::Rect, raster::{Mask, runs::components}};
 /// let mask = Mask { rect: Rect::of_size(3, 2), bits: vec![1, 0, 0, 0, 1, 1] };
 /// let found = components(&mask);
 /// assert_eq!((found.len(), found[0].area), (1, 3));

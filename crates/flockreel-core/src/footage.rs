@@ -72,8 +72,8 @@ pub fn spread_by_reading<S: FrameSource + ?Sized>(
 /// indices if there are fewer than `n` frames.
 ///
 /// ```
-/// assert_eq!(flockreel::footage::spread_idx(10, 2), [2, 7]);
-/// assert_eq!(flockreel::footage::spread_idx(2, 5), [0, 1]);
+/// assert_eq!(flockreel_core::footage::spread_idx(10, 2), [2, 7]);
+/// assert_eq!(flockreel_core::footage::spread_idx(2, 5), [0, 1]);
 /// ```
 pub fn spread_idx(n_frames: usize, n: usize) -> Vec<usize> {
     let n = n.min(n_frames);
