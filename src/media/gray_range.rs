@@ -25,7 +25,7 @@ pub(super) struct GrayRange {
 
 impl GrayRange {
     /// Converts a 16-bit level to 8 bits: 0 at the start of the range and below, 255 at its end and above.
-    pub(super) fn to_8_bits(&self, level: u16) -> u8 {
+    pub(super) fn to_8_bits(self, level: u16) -> u8 {
         let width = u32::from(self.white - self.black);
         let above = u32::from(level.saturating_sub(self.black)).min(width);
         ((above * 255 + width / 2) / width) as u8

@@ -139,20 +139,8 @@ pub fn follow(
     });
     let times_s: Vec<f64> = results.iter().map(|r| r.time_s).collect();
     let movers = movers::gather(&movers.collect::<Vec<_>>(), &times_s);
-    let tracked = results
-        .into_iter()
-        .zip(chosen)
-        .map(|(result, chosen)| Tracked {
-            time_s: result.time_s,
-            background_idx: result.background_idx,
-            sighting: chosen.and_then(|(at, confidence)| {
-                let candidate = result.candidates.into_iter().nth(at)?;
-                Some(Sighting {
-                    confidence,
-                    ..candidate.sighting
-                })
-            }),
-        });
+    let tracked = results.into_iter().zip(chosen);
+    let tracked = tracked.map(|(result, chosen)| result.with_chosen(chosen));
     let frames: Vec<Tracked> = tracked.collect();
     if frames.iter().all(|t| t.sighting.is_none()) {
         return Err(Error::NothingMoves);
@@ -163,6 +151,24 @@ pub fn follow(
         movers,
         scratch,
     })
+}
+
+impl FrameResult {
+    /// Returns the frame with the sighting of the chosen candidate, given by its index and confidence.
+    fn with_chosen(self, chosen: Option<(usize, f64)>) -> Tracked {
+        let sighting = chosen.and_then(|(at, confidence)| {
+            let candidate = self.candidates.into_iter().nth(at)?;
+            Some(Sighting {
+                confidence,
+                ..candidate.sighting
+            })
+        });
+        Tracked {
+            time_s: self.time_s,
+            background_idx: self.background_idx,
+            sighting,
+        }
+    }
 }
 
 /// Compares one frame with its background and measures the candidates.
