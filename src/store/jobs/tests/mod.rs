@@ -1,6 +1,8 @@
 //! Tests of the transitions on a real database (docs/explanation/promises.md, "No job is lost", "Stalled
 //! workers cannot overwrite" and "Poison jobs"). Times are arguments, so nothing sleeps.
 
+mod owners; // fair queue and quotas
+
 use tempfile::TempDir;
 
 use super::cancel::Cancel;
@@ -363,73 +365,4 @@ async fn second_store_in_a_folder_is_refused() {
     assert!(matches!(second.err(), Some(Error::InUse(_))));
     drop(first);
     assert!(Store::open(data.path()).await.is_ok());
-}
-
-fn of(owner: &str, quota: i64) -> Account {
-    Account {
-        owner: Owner(owner.to_owned()),
-        quota: Some(quota),
-    }
-}
-
-/// Returns the number of jobs that start before the job of the owner who queued last, if `n_workers` jobs run
-/// at once.
-async fn n_before_the_other(n_workers: usize) -> usize {
-    let queue = Queue::open().await;
-    for _ in 0..500 {
-        let charged = queue.charge(of("many", 500), None, 0).await;
-        charged.unwrap();
-    }
-    let mut running = std::collections::VecDeque::new();
-    for now_ms in 1..=n_workers {
-        running.extend(queue.claim(now_ms as i64).await);
-    }
-    let one = queue.charge(of("one", 1), None, 0).await.unwrap();
-    for n_begun in 0..500 {
-        let ended = running.pop_front().unwrap();
-        assert_eq!(queue.finish(&ended).await, Change::Made);
-        let lease = queue.claim(100 + n_begun as i64).await.unwrap();
-        if lease.job_id == one {
-            return n_begun;
-        }
-        running.push_back(lease);
-    }
-    500
-}
-
-#[tokio::test]
-async fn one_job_does_not_wait_for_five_hundred_of_another_owner() {
-    assert_eq!(n_before_the_other(1).await, 0);
-    assert_eq!(n_before_the_other(3).await, 0);
-}
-
-#[tokio::test]
-async fn owners_take_turns() {
-    let queue = Queue::open().await;
-    let mut jobs = Vec::new();
-    for owner in ["a", "a", "a", "b", "b"] {
-        jobs.push(queue.charge(of(owner, 9), None, 0).await.unwrap());
-    }
-    let mut turns = Vec::new();
-    for now_ms in 1..=5 {
-        let lease = queue.claim(now_ms).await.unwrap();
-        turns.push(jobs.iter().position(|job| *job == lease.job_id).unwrap());
-        assert_eq!(queue.finish(&lease).await, Change::Made);
-    }
-    assert_eq!(turns, [0, 3, 1, 4, 2]);
-}
-
-#[tokio::test]
-async fn quota_limits_queued_and_running_jobs() {
-    let queue = Queue::open().await;
-    let charge = async || queue.charge(of("a", 2), None, 0).await;
-    charge().await.unwrap();
-    charge().await.unwrap();
-    let refused = charge().await;
-    assert!(matches!(refused, Err(Error::QuotaExceeded { quota: 2 })));
-    let lease = queue.claim(1).await.unwrap();
-    assert!(charge().await.is_err(), "a running job counts");
-    queue.charge(of("b", 1), None, 0).await.unwrap();
-    assert_eq!(queue.finish(&lease).await, Change::Made);
-    charge().await.unwrap();
 }
