@@ -3,6 +3,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, SeekFrom, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 use bytes::Bytes;
@@ -90,7 +91,9 @@ impl LocalFolder {
     /// Marks these files permanently (`identity`).
     pub(super) fn set_mark(&self, mark: &str) -> io::Result<()> {
         // The file gets its name only when it is complete. Another process may write the same mark.
-        let mut file = tempfile::NamedTempFile::new_in(&self.root)?;
+        let mut file = tempfile::Builder::new()
+            .permissions(fs::Permissions::from_mode(0o666))
+            .tempfile_in(&self.root)?;
         file.write_all(mark.as_bytes())?;
         file.as_file().sync_all()?;
         file.persist(self.root.join(MARK))?;

@@ -14,6 +14,10 @@ use flockreel_core::code::Code;
 
 async fn queued(app: &TestApp) -> Value {
     let footage_id = app.upload(&TINY).await;
+    analysis_of(app, &footage_id).await
+}
+
+async fn analysis_of(app: &TestApp, footage_id: &str) -> Value {
     app.accept("/v1/analyses", json!({"footage_id": footage_id}))
         .await
 }
@@ -93,14 +97,15 @@ async fn a_queued_job_is_cancelled_once() {
 #[tokio::test]
 async fn result_that_never_comes_is_answered_with_the_reason_and_the_job() {
     let app = TestApp::idle().await;
-    let failed = queued(&app).await;
+    let footage_id = app.upload(&TINY).await;
+    let failed = analysis_of(&app, &footage_id).await;
     let worker = Worker::new(app.context.clone());
     let step = worker.step_by(|_, _| Err(media::Error::NoVideoStream.into()));
     assert!(matches!(
         step.await.unwrap(),
         Step::Failed(_, Code::NoVideoStream)
     ));
-    let cancelled = queued(&app).await;
+    let cancelled = analysis_of(&app, &footage_id).await;
     let job = format!("/v1/jobs/{}", cancelled["job_id"].as_str().unwrap());
     app.delete(&job).send().await.unwrap();
     for (accepted, code) in [(failed, "no_video_stream"), (cancelled, "cancelled")] {
