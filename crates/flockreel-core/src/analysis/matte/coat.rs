@@ -87,13 +87,13 @@ impl Coat<'_> {
     }
 
     /// Returns whether a pixel differs much less from the background than the starkest pixels.
-    fn is_faint(&self, k: usize) -> bool {
+    pub(super) fn is_faint(&self, k: usize) -> bool {
         self.level(k) < FAINT_SHARE * self.starkest
             || self.share(k) < FAINT_SHARE * self.starkest_share
     }
 
     /// Returns whether a pixel has the coat's color: it is much nearer to it than to the background.
-    fn matches(&self, k: usize) -> bool {
+    pub(super) fn matches(&self, k: usize) -> bool {
         let seen = &self.difference.rgb.pixels[3 * k..3 * k + 3];
         let differences = seen.iter().zip(self.color);
         let max_difference = differences.fold(0.0, |most, (&seen, color)| {

@@ -3,6 +3,7 @@
 //! Alpha is 1 inside the silhouette. In a band around the outline, alpha is the pixel's share of the way from
 //! the background's color to the animal's color nearby. The background's share is then subtracted from the
 //! color. Shadows are left out, because a sprite would turn them with the body; `shadow` measures them.
+//! Mirror images are left out too (`ground`).
 //!
 //! Values are encoded sRGB, as in the compositor. So a matte over its background reproduces the frame, except
 //! for shadows. See docs/explanation/algorithms.md, "Mattes".
@@ -47,10 +48,11 @@ pub fn pull(
         .inflated(band_px + 1, frame.width, frame.height);
     let difference = silhouette::difference(frame, background, light, rect);
     let mask = over_box(silhouette, rect);
-    let on_ground = ground::part_on_ground(&mask, background);
+    let on_ground = ground::part_on_ground(&mask, &mask, background);
     let coat_of = |mask: &Mask| Coat::measure(mask, &difference, background);
     let coat = coat_of(&mask).or_starker(coat_of(&on_ground));
-    let solid = coat.without_halo(&mask, band_px);
+    let mut solid = coat.without_halo(&mask, band_px);
+    ground::clear_images(&mut solid, &mask, &coat, background);
     let inside = solid.eroded_by(band_px);
     let outer = mask.dilated_by(band_px);
     let mut without_gaps = solid.dilated_by(MAX_GAP_PX).eroded_by(MAX_GAP_PX);

@@ -9,6 +9,52 @@ fn wall(x: u32, _: u32) -> u8 {
     if x < 70 { PAPER } else { WALL }
 }
 
+/// A dark body, its shadow on the paper, and its image in the wall, in one place as dark as the body.
+fn with_image(x: u32, y: u32) -> u8 {
+    let is_cast = (BODY.right()..100).contains(&x) && (28..38).contains(&y);
+    let is_clear = (80..92).contains(&x) && (30..36).contains(&y);
+    match (steps_away([x, y], BODY), is_clear, is_cast) {
+        (0, ..) | (_, true, _) => FUR,
+        (_, _, true) => wall(x, y) - wall(x, y) / 5,
+        _ => wall(x, y),
+    }
+}
+
+#[test]
+fn image_in_a_dark_wall_and_shadow_before_it_are_left_out() {
+    let drawn = drawn_on(wall, with_image);
+    for (x, y) in (29..37).flat_map(|y| (64..100).map(move |x| (x, y))) {
+        assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
+    }
+}
+
+/// A body that ends at the wall, and a small image in the wall.
+///
+/// The image is as dark as the body in its middle and fades over ten pixels.
+fn with_a_small_image(x: u32, y: u32) -> u8 {
+    let midst = Rect {
+        x: 75,
+        y: 31,
+        w: 3,
+        h: 3,
+    };
+    let faded = steps_away([x, y], midst).min(10) as u8;
+    match steps_away([x.saturating_sub(10), y], BODY) {
+        0 => FUR,
+        _ if wall(x, y) == WALL => FUR + (WALL - FUR) / 10 * faded,
+        _ => wall(x, y),
+    }
+}
+
+#[test]
+fn fading_image_is_left_out_however_dark_its_middle() {
+    let drawn = drawn_on(wall, with_a_small_image);
+    assert_eq!(drawn.pixel(50, 33)[3], 255, "the body");
+    for (x, y) in (31..34).flat_map(|y| (75..78).map(move |x| (x, y))) {
+        assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
+    }
+}
+
 /// Nearly black, slightly lighter on the left.
 fn nearly_black(x: u32, _: u32) -> u8 {
     if x < 62 { 4 } else { 1 }
