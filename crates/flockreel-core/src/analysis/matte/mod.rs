@@ -13,6 +13,7 @@ mod given;
 mod ground;
 
 use self::coat::Coat;
+use self::ground::Ground;
 use super::scene::background::Background;
 use super::scene::light::Light;
 use super::silhouette::{self, Difference};
@@ -48,11 +49,13 @@ pub fn pull(
         .inflated(band_px + 1, frame.width, frame.height);
     let difference = silhouette::difference(frame, background, light, rect);
     let mask = over_box(silhouette, rect);
-    let on_ground = ground::part_on_ground(&mask, &mask, background);
+    let on_ground = Ground::behind(&mask, background).part_of(&mask);
     let coat_of = |mask: &Mask| Coat::measure(mask, &difference, background);
     let coat = coat_of(&mask).or_starker(coat_of(&on_ground));
     let mut solid = coat.without_halo(&mask, band_px);
-    ground::clear_images(&mut solid, &mask, &coat, background);
+    let ground = Ground::behind(&solid, background);
+    let images = ground.clear_fading_images(&mut solid, &mask, &coat);
+    ground.clear_separate_images(&mut solid, &images, &coat);
     let inside = solid.eroded_by(band_px);
     let outer = mask.dilated_by(band_px);
     let mut without_gaps = solid.dilated_by(MAX_GAP_PX).eroded_by(MAX_GAP_PX);

@@ -28,6 +28,21 @@ fn image_in_a_dark_wall_and_shadow_before_it_are_left_out() {
     }
 }
 
+/// That scene, and an image farther along the wall, as dark as the body.
+fn with_image_across_the_wall(x: u32, y: u32) -> u8 {
+    let is_image = (92..102).contains(&x) && (29..36).contains(&y);
+    if is_image { FUR } else { across_the_wall(x, y) }
+}
+
+#[test]
+fn image_too_large_for_a_limb_is_left_out() {
+    let drawn = drawn_on(wall, with_image_across_the_wall);
+    assert_eq!(drawn.pixel(80, 33)[3], 255, "the body");
+    for (x, y) in (29..36).flat_map(|y| (92..102).map(move |x| (x, y))) {
+        assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
+    }
+}
+
 /// A body that ends at the wall, and a small image in the wall.
 ///
 /// The image is as dark as the body in its middle and fades over ten pixels.
