@@ -5,7 +5,7 @@
 //! above it. `tests/it/tidy` checks the imports.
 //!
 //! A video is any [`footage::FrameSource`]. [`analysis::analyze`] makes a [`library::Library`] of it,
-//! [`flock::plan_flock`] a flock of the library, and [`fish::drive`] the motion of a virtual fish.
+//! [`flock::plan_flock`] a flock of the library, and [`fish::drive()`] the motion of a virtual fish.
 
 // Ring 1: values.
 pub mod code; // every stable error code
