@@ -2,8 +2,8 @@
 //! (docs/explanation/algorithms.md, "Transitions and playback" and "Quality measures").
 //!
 //! With `LIBRARY_DIR`, uses the sprites of that library. Compares the time for all distances with the time
-//! for the transitions below its epsilon, on one thread and on all. With `N`, draws N sprites
-//! and times the whole search. Prints one line of JSON.
+//! for the transitions below its epsilon, on one thread and on all. With `N`, draws N sprites and times the
+//! whole search. Prints one line of JSON.
 
 #[path = "../crates/flockreel-core/benches/poses/mod.rs"]
 mod poses;
@@ -30,7 +30,7 @@ fn main() {
     match timing::arguments().next() {
         None => println!("arguments: LIBRARY_DIR, or a number of frames"),
         Some(argument) => match argument.parse() {
-            Ok(n_frames) => from_end_to_end(n_frames),
+            Ok(n_frames) => time_search(n_frames),
             Err(_) => pruned_against_all(Path::new(&argument)),
         },
     }
@@ -118,7 +118,7 @@ fn times(library: &Library, params: &Params, pixels: &ComparedSprites) -> Times 
 }
 
 /// Draws sprites of 96 x 64 pixels and times the search for their transitions only.
-fn from_end_to_end(n_frames: usize) {
+fn time_search(n_frames: usize) {
     let swim = Swim::new(n_frames);
     let scratch = Arc::new(Spill::into(&std::env::temp_dir()));
     let sprites = Sprites::drawn([96, 64], n_frames, scratch, |frame_idx, rgba| {

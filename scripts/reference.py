@@ -16,7 +16,6 @@ import subprocess
 import sys
 import tempfile
 import urllib.request
-from http import HTTPStatus
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -163,16 +162,16 @@ def codes(names):
 
 
 def errors(page):
-    entry = r'<dt id="(\w+)">.*?<small>(\d+).*?</dt>\s*<dd>(.*?)</dd>\s*<dd class="soft">(.*?)</dd>'
+    entry = r'<dt id="(\w+)">.*?<small>([^<]+)</small></dt>\s*<dd>(.*?)</dd>\s*<dd class="soft">(.*?)</dd>'
     rows = []
     for code, status, *texts in re.findall(entry, page, re.DOTALL):
-        name = HTTPStatus(int(status)).phrase if int(status) in list(HTTPStatus) else ""
         texts = [html.unescape(re.sub("</?code>", "`", text)) for text in texts]
-        rows.append([f"`{code}`", f"{status} {name}".strip(), *texts])
+        rows.append([f"`{code}`", status, *texts])
     if not rows or len(rows) != page.count("<dt "):
         sys.exit("reference.py: cannot read /docs/errors: its HTML has another form than the script expects")
     text = f"# Error codes\n\n{NOTE}\nThe API gives the code as `code` in `application/problem+json` (RFC 9457), and "
-    text += "as `error.code` in failed jobs.\nThe command line prints it in parentheses. A code is never renamed.\n"
+    text += "as `error.code` in failed jobs.\nA request for the result of a failed or cancelled job gets the code of "
+    text += "the job with status 404.\nThe command line prints the code in parentheses. A code is never renamed.\n"
     return text + table(["code", "HTTP status", "meaning", "advice"], *rows)
 
 

@@ -198,8 +198,8 @@ async fn store_response(
         headers: serde_json::json!(headers).to_string(),
         answer: bytes.to_vec(),
     };
-    // The key stays key until the response is stored. If the client disconnects or the database fails
-    // before, dropping the guard releases it.
+    // The guard keeps the key until the response is stored. If the client disconnects or the database fails
+    // before that, dropping the guard releases the key.
     if let Some((store, scope)) = &key.0 {
         store.finish_key(scope, &stored).await?;
     }

@@ -13,7 +13,7 @@ mod download;
 mod extract; // ids, JSON bodies, conditional headers
 mod paging;
 mod receive; // request bodies to disk
-mod resources; // what footage, libraries, flocks and fish have in common
+mod resources; // find, list, get and delete: footage, libraries, flocks, fish
 mod timestamp;
 
 mod analyses;
@@ -73,7 +73,7 @@ pub struct Shared {
     /// Store, limits of the queue, and the signal that wakes the workers.
     pub context: Context,
     /// Version and sandbox of the media tool, found at the start; or the reason why there is no usable tool.
-    pub walls: Result<media::SandboxStatus, String>,
+    pub media_tool: Result<media::SandboxStatus, String>,
     /// Rate limits of owners and addresses.
     rates: Rates,
     /// Counters of HTTP requests.
@@ -103,7 +103,7 @@ impl AppState {
         let tool = tokio::task::spawn_blocking(media::sandbox_status).await;
         let tool = tool.map_err(std::io::Error::other)?;
         match &tool {
-            Ok(walls) => tracing::info!(version = walls.version, "media tool found"),
+            Ok(status) => tracing::info!(version = status.version, "media tool found"),
             Err(error) => tracing::error!(%error, "ffmpeg was not found: install it"),
         }
         let requests = Requests::default();
@@ -113,7 +113,7 @@ impl AppState {
             rates: Rates::new(config.rate),
             config,
             context,
-            walls: tool.map_err(|error| error.to_string()),
+            media_tool: tool.map_err(|error| error.to_string()),
         })))
     }
 }

@@ -214,7 +214,8 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         | Code::IdempotencyKeyReused
         | Code::InvalidParams => StatusCode::UNPROCESSABLE_ENTITY,
         Code::StorageFull => StatusCode::INSUFFICIENT_STORAGE,
-        Code::NotFound | Code::NotReady => StatusCode::NOT_FOUND,
+        // A cancelled job has no result. Only requests for the result get its code.
+        Code::NotFound | Code::NotReady | Code::Cancelled => StatusCode::NOT_FOUND,
         Code::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
         Code::MalformedRequest | Code::BodyCutOff => StatusCode::BAD_REQUEST,
         Code::UnsupportedMediaType => StatusCode::UNSUPPORTED_MEDIA_TYPE,
@@ -234,6 +235,6 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::QuotaExceeded | Code::RateLimited => StatusCode::TOO_MANY_REQUESTS,
         Code::ScopeTooSmall | Code::CrossSite => StatusCode::FORBIDDEN,
         Code::Stopping | Code::QueueFull | Code::Busy => StatusCode::SERVICE_UNAVAILABLE,
-        Code::Cancelled | Code::CrashedWorker | Code::Internal => StatusCode::INTERNAL_SERVER_ERROR,
+        Code::CrashedWorker | Code::Internal => StatusCode::INTERNAL_SERVER_ERROR,
     }
 }

@@ -141,7 +141,8 @@ async fn receive_form(
     }
     let received = ReceivedFiles {
         draft,
-        video: video.ok_or_else(|| malformed("the form lacks the field: footage"))?,
+        video: video
+            .ok_or_else(|| malformed("the form lacks a video: name its field video or footage"))?,
         background,
         masks,
         name: label(&form.name.or(file_name).unwrap_or_default()),

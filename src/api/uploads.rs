@@ -11,7 +11,8 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use futures_util::StreamExt;
 use sha1::Sha1;
-use sha2::{Digest, Sha256};
+use sha2::Sha256;
+use sha2::digest::DynDigest;
 use tokio::time::timeout;
 use uuid::Uuid;
 
@@ -215,7 +216,7 @@ async fn receive_chunk(
         }
         file.append(&bytes).await?;
         if let Some(checksum) = &mut checksum {
-            checksum.update(&bytes);
+            checksum.hasher.update(&bytes);
         } else if received_bytes - upload.offset_bytes >= SYNC_EVERY_BYTES {
             file.sync().await?;
             upload.offset_bytes = received_bytes;
@@ -334,13 +335,8 @@ fn is_chunk(headers: &HeaderMap) -> bool {
 
 /// Expected hash of the body of one request.
 struct Checksum {
-    hasher: Hasher,
+    hasher: Box<dyn DynDigest + Send>,
     expected: Vec<u8>,
-}
-
-enum Hasher {
-    Sha1(Sha1),
-    Sha256(Sha256),
 }
 
 impl Checksum {
@@ -353,9 +349,9 @@ impl Checksum {
         let (name, value) = (line.to_str().ok())
             .and_then(|line| line.split_once(' '))
             .ok_or_else(malformed)?;
-        let hasher = match name {
-            "sha1" => Hasher::Sha1(Sha1::new()),
-            "sha256" => Hasher::Sha256(Sha256::new()),
+        let hasher: Box<dyn DynDigest + Send> = match name {
+            "sha1" => Box::new(Sha1::default()),
+            "sha256" => Box::new(Sha256::default()),
             _ => return Err(malformed()),
         };
         let expected = STANDARD
@@ -364,19 +360,8 @@ impl Checksum {
         Ok(Some(Checksum { hasher, expected }))
     }
 
-    fn update(&mut self, bytes: &[u8]) {
-        match &mut self.hasher {
-            Hasher::Sha1(hasher) => hasher.update(bytes),
-            Hasher::Sha256(hasher) => hasher.update(bytes),
-        }
-    }
-
     fn verify(self) -> Result<(), Problem> {
-        let found = match self.hasher {
-            Hasher::Sha1(hasher) => hasher.finalize().to_vec(),
-            Hasher::Sha256(hasher) => hasher.finalize().to_vec(),
-        };
-        if found == self.expected {
+        if *self.hasher.finalize() == *self.expected {
             Ok(())
         } else {
             Err(Code::ChecksumMismatch.into())

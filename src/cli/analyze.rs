@@ -269,7 +269,7 @@ fn footage_summary(files: &[PathBuf]) -> Result<FootageSummary, Error> {
     Ok(FootageSummary { sha256, n_bytes })
 }
 
-/// Returns a sentence that tells the view, its probability, and the flag that changes it.
+/// Returns a sentence with the view, its probability, and the flag that changes it.
 fn view_sentence(poses: &Poses) -> String {
     let (seen, other) = match poses.view {
         View::Side => ("from the side", "top"),

@@ -100,10 +100,11 @@ impl JobInput for Input {
         };
         let files = attempt.fetch(&footage.folder, &[VIDEO, BACKGROUND, MASKS])?;
         let path_of = |name| files.path().join(name);
-        let hints = read_options(&self.params);
-        let video = Video::open_with(&path_of(VIDEO), &limits, &hints)?;
+        let options = read_options(&self.params);
+        let video = Video::open_with(&path_of(VIDEO), &limits, &options)?;
         let given = (!footage.masks_sha256.is_empty()).then(|| path_of(MASKS));
-        let masks = Masks::open(&video, &path_of(VIDEO), given.as_deref(), &limits, &hints)?;
+        let path = path_of(VIDEO);
+        let masks = Masks::open(&video, &path, given.as_deref(), &limits, &options)?;
         let masked = masks.as_ref().map(|masks| masks.over(&video)).transpose()?;
         let background = if footage.background_sha256.is_empty() {
             None

@@ -32,7 +32,7 @@ pub struct Attempt<'a> {
 /// Result of an attempt. The files are in its draft.
 #[derive(Clone, Debug)]
 pub struct Product {
-    /// What the result was made from.
+    /// Input of the job.
     pub source: Source,
     /// All parameters, JSON.
     pub params: String,

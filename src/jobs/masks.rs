@@ -30,15 +30,15 @@ impl Masks {
         path: &Path,
         given: Option<&Path>,
         limits: &Limits,
-        hints: &ReadOptions,
+        options: &ReadOptions,
     ) -> Result<Option<Masks>, Error> {
         if let Some(given) = given {
             // Masks have no frame rate of their own: each belongs to one frame.
-            let hints = ReadOptions {
+            let options = ReadOptions {
                 fps: Some(footage.format().fps),
-                ..*hints
+                ..*options
             };
-            let video = Video::open_with(given, limits, &hints)?;
+            let video = Video::open_with(given, limits, &options)?;
             return Ok(Some(Masks {
                 video,
                 is_mixed: true,
@@ -47,11 +47,11 @@ impl Masks {
         if !footage.has_alpha() {
             return Ok(None);
         }
-        let hints = ReadOptions {
+        let options = ReadOptions {
             alpha_as_gray: true,
-            ..*hints
+            ..*options
         };
-        let video = Video::open_with(path, limits, &hints)?;
+        let video = Video::open_with(path, limits, &options)?;
         let masks = Masks {
             video,
             is_mixed: false,

@@ -79,7 +79,7 @@ impl JobInput for Input {
         std::fs::rename(&written, &path)?;
         let format = film.format();
         Ok(Product {
-            source: Source::Nothing(SampleFootage {
+            source: Source::Sample(SampleFootage {
                 name: "sample.mp4",
                 width: format.width,
                 height: format.height,

@@ -25,7 +25,7 @@ pub enum Notice {
         /// Number of leaps.
         n_leaps: usize,
     },
-    /// Neither the file nor a hint gives the frame rate.
+    /// Neither the file nor the user gives the frame rate.
     #[error(
         "The file does not state its frame rate, so {fps} frames per second are assumed. Set the rate with --fps \
          (`fps` in the API)."

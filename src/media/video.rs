@@ -47,7 +47,7 @@ impl Video {
         }
     }
 
-    /// Returns notes about the file: assumptions, and corrected faults.
+    /// Returns notices about the file: assumptions, and corrected faults.
     pub fn notices(&self) -> &[Notice] {
         match &self.0 {
             Kind::Film(film) => film.notices(),

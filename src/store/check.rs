@@ -15,22 +15,23 @@ pub type Fault = String;
 impl Store {
     /// Returns all violations of an idle store; an intact store has none. Reads and hashes every file.
     pub async fn check(&self, now_ms: i64) -> Result<Vec<Fault>, Error> {
-        self.check_strays_from(Duration::ZERO, now_ms).await
+        self.check_with_grace(Duration::ZERO, now_ms).await
     }
 
     /// Returns all violations of a store that is in use or was interrupted by a crash. A folder without a row
     /// counts only after an hour, because its row may still follow.
     pub async fn check_after_crash(&self, now_ms: i64) -> Result<Vec<Fault>, Error> {
-        self.check_strays_from(GRACE, now_ms).await
+        self.check_with_grace(GRACE, now_ms).await
     }
 
-    async fn check_strays_from(&self, age: Duration, now_ms: i64) -> Result<Vec<Fault>, Error> {
+    /// Folders without a row count as violations from the age `grace`.
+    async fn check_with_grace(&self, grace: Duration, now_ms: i64) -> Result<Vec<Fault>, Error> {
         let mut faults = self.broken_rows().await?;
         faults.extend(self.missing_or_altered_blobs().await?);
         faults.extend(self.short_uploads().await?);
         for folder in self.folders_without_row().await? {
-            let is_old = SystemTime::now().duration_since(folder.modified);
-            if is_old.is_ok_and(|found| found >= age) {
+            let age = SystemTime::now().duration_since(folder.modified);
+            if age.is_ok_and(|age| age >= grace) {
                 faults.push(format!("I2: the folder has no row: {}", folder.name));
             }
         }

@@ -156,8 +156,8 @@ impl Store {
     }
 }
 
-/// Adds the row of the sample that a finished job made. Fails with
-/// [`Error::AlreadyStored`] if the owner has uploaded the same file in the meantime.
+/// Adds the row of the sample that a finished job made. Fails with [`Error::AlreadyStored`] if the owner has
+/// uploaded the same file in the meantime.
 pub(super) async fn insert_sample(
     transaction: &mut Transaction,
     lease: &Lease,

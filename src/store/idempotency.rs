@@ -77,13 +77,11 @@ impl Store {
             .bind(now_ms - ANSWER_LIFETIME_MS)
             .execute(&mut transaction)
             .await?;
-        let known: Option<(String, Uuid, Option<Vec<u8>>, i64)> = sql::query(
+        let known: Option<(String, Uuid, Option<Vec<u8>>, i64)> = with_key(
             "select state, ids, body_sha256, created_ms from idempotency \
              where caller = $1 and route = $2 and key = $3",
+            scope,
         )
-        .bind(&scope.caller)
-        .bind(&scope.route)
-        .bind(&scope.key)
         .fetch_optional(&mut transaction)
         .await?;
         let ids = match known {
@@ -102,15 +100,13 @@ impl Store {
             None => Uuid::now_v7(),
         };
         self.reserve.require().await?;
-        sql::query(
+        with_key(
             "insert into idempotency (caller, route, key, ids, state, body_sha256, created_ms) \
              values ($1, $2, $3, $4, 'running', $5, $6) \
              on conflict (caller, route, key) do update \
              set state = 'running', created_ms = excluded.created_ms",
+            scope,
         )
-        .bind(&scope.caller)
-        .bind(&scope.route)
-        .bind(&scope.key)
         .bind(ids)
         .bind(body_sha256)
         .bind(now_ms)
@@ -143,13 +139,11 @@ impl Store {
 
     /// Renews the key of a request that is still running.
     pub async fn renew_key(&self, scope: &Scope, now_ms: i64) -> Result<(), Error> {
-        sql::query(
+        with_key(
             "update idempotency set created_ms = $4 \
              where caller = $1 and route = $2 and key = $3 and state = 'running'",
+            scope,
         )
-        .bind(&scope.caller)
-        .bind(&scope.route)
-        .bind(&scope.key)
         .bind(now_ms)
         .execute(&self.writer)
         .await?;
@@ -159,13 +153,11 @@ impl Store {
     /// Stores the answer of the request that holds the key.
     pub async fn finish_key(&self, scope: &Scope, answer: &Answer) -> Result<(), Error> {
         let finish = || async {
-            sql::query(
+            with_key(
                 "update idempotency set state = 'done', body_sha256 = $4, status = $5, headers = $6, \
                  answer = $7 where caller = $1 and route = $2 and key = $3 and state = 'running'",
+                scope,
             )
-            .bind(&scope.caller)
-            .bind(&scope.route)
-            .bind(&scope.key)
             .bind(&answer.body_sha256)
             .bind(i64::from(answer.status))
             .bind(&answer.headers)
@@ -180,13 +172,11 @@ impl Store {
     /// Releases the key of a request that ended without an answer to keep.
     pub async fn interrupt_key(&self, scope: &Scope) -> Result<(), Error> {
         let interrupt = || async {
-            sql::query(
+            with_key(
                 "update idempotency set state = 'interrupted' \
                  where caller = $1 and route = $2 and key = $3 and state = 'running'",
+                scope,
             )
-            .bind(&scope.caller)
-            .bind(&scope.route)
-            .bind(&scope.key)
             .execute(&self.writer)
             .await?;
             Ok(())
@@ -206,14 +196,22 @@ impl Store {
     }
 }
 
+/// Returns a statement with the parts of a key as `$1`, `$2` and `$3`.
+fn with_key(sql: &'static str, scope: &Scope) -> sql::Query {
+    sql::query(sql)
+        .bind(&scope.caller)
+        .bind(&scope.route)
+        .bind(&scope.key)
+}
+
 /// Returns the stored answer, read within the transaction. A second connection might never become free if
 /// every request waits for one.
 async fn answer(transaction: &mut Transaction, scope: &Scope) -> Result<Answer, sqlx::Error> {
-    let row = sql::query(
+    let row = with_key(
         "select body_sha256, status, headers, answer from idempotency \
          where caller = $1 and route = $2 and key = $3",
+        scope,
     );
-    let row = row.bind(&scope.caller).bind(&scope.route).bind(&scope.key);
     row.fetch_one(transaction).await
 }
 
@@ -230,19 +228,24 @@ mod tests {
         }
     }
 
+    /// Returns an answer to store.
+    fn accepted() -> Answer {
+        Answer {
+            body_sha256: vec![7; 32],
+            status: 202,
+            headers: "[]".into(),
+            answer: b"{}".to_vec(),
+        }
+    }
+
     #[tokio::test]
     async fn answer_is_stored_for_a_day() {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         let Begun::Run(first) = store.begin_key(&scope(), None, 0).await.unwrap() else {
-            panic!("nobody had this key");
+            panic!("the key is not new");
         };
-        let answer = Answer {
-            body_sha256: vec![7; 32],
-            status: 202,
-            headers: "[]".into(),
-            answer: b"{}".to_vec(),
-        };
+        let answer = accepted();
         store.finish_key(&scope(), &answer).await.unwrap();
         let met = store
             .begin_key(&scope(), None, ANSWER_LIFETIME_MS - 1)
@@ -277,12 +280,7 @@ mod tests {
         let data = tempfile::tempdir().unwrap();
         let store = fresh::open(data.path()).await;
         store.begin_key(&scope(), None, 0).await.unwrap();
-        let answer = Answer {
-            body_sha256: vec![7; 32],
-            status: 202,
-            headers: "[]".into(),
-            answer: b"{}".to_vec(),
-        };
+        let answer = accepted();
         store.finish_key(&scope(), &answer).await.unwrap();
         let scope = scope();
         let replays = (0..40).map(|_| store.begin_key(&scope, None, 1));
@@ -310,12 +308,12 @@ mod tests {
     async fn key_of_another_process_expires_after_a_lease_without_renewal() {
         let data = tempfile::tempdir().unwrap();
         let storage = fresh::storage(data.path());
-        let (dead, other) = (
+        let (first_process, other) = (
             Store::open(storage.clone()).await.unwrap(),
             Store::open_beside(storage).await.unwrap(),
         );
-        let first = dead.begin_key(&scope(), None, 0).await.unwrap();
-        dead.renew_key(&scope(), 10_000).await.unwrap();
+        let first = first_process.begin_key(&scope(), None, 0).await.unwrap();
+        first_process.renew_key(&scope(), 10_000).await.unwrap();
         let met = other.begin_key(&scope(), None, 10_000 + LEASE_MS).await;
         assert_eq!(met.unwrap(), Begun::Running);
         let met = other.begin_key(&scope(), None, 10_001 + LEASE_MS).await;

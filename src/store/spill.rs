@@ -94,17 +94,17 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let spill = Spill::with_limit(folder.path(), 10);
         let pieces: Vec<Vec<u8>> = (0..9u8).map(|k| vec![k; usize::from(k)]).collect();
-        let places: Vec<u64> = pieces
+        let offsets: Vec<u64> = pieces
             .iter()
-            .map(|piece| spill.put(piece).expect("there is room"))
+            .map(|piece| spill.put(piece).expect("the bytes are stored"))
             .collect();
-        for (piece, at) in pieces.iter().zip(places) {
+        for (piece, at) in pieces.iter().zip(offsets) {
             let mut back = vec![99; piece.len()];
             spill.get(at, &mut back);
             assert_eq!(&back, piece);
         }
         assert!(spill.spilled.load(Ordering::Relaxed) > 20);
-        let names = std::fs::read_dir(folder.path()).expect("it is there");
+        let names = std::fs::read_dir(folder.path()).expect("the folder is readable");
         assert_eq!(names.count(), 0);
     }
 

@@ -31,8 +31,8 @@ def main(program):
         os.environ["CONTRACT_SEEN"] = str(folder / "seen")
         with started(program, folder / "data", "--log", "warn", "--max-queued", "20") as address:
             ids = furnish(program, address, folder)
-            faults = run(address, folder, "chance", "")
-            faults += run(address, folder, "what is there", known(ids))
+            faults = run(address, folder, "random requests", "")
+            faults += run(address, folder, "stored objects", known(ids))
             faults += walk_through(program, address, folder)
         checked = subprocess.run([program, "check", "--data", folder / "data"], check=False)
         sys.exit(1 if faults or checked.returncode else 0)
@@ -78,7 +78,7 @@ def run(address, folder, what, settings):
 
 def walk_through(program, address, folder):
     """Calls every operation with valid input. Returns the number of operations that never succeeded."""
-    print("contract tests: a walk", flush=True)
+    print("contract tests: one valid call of each operation", flush=True)
     film, data = folder / "another.mp4", folder / "data"
     command = [program, "sample", "-o", film, "--frames", "120", "--size", "160x120", "--seed", "2"]
     subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
@@ -91,7 +91,7 @@ def walk_through(program, address, folder):
     walk.whole()
     never = tell(folder / "seen", walk.document.raw_schema)
     for operation in never:
-        print(f"contract tests: never a success: {operation}")
+        print(f"contract tests: never succeeded: {operation}")
     return len(never)
 
 

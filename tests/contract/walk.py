@@ -56,8 +56,8 @@ class Walk:
         footage = self.call("POST /v1/footage", body=self.film, media_type=STREAM).json()["id"]
         same = self.call("POST /v1/footage", body={"video": self.film}, media_type=FORM)
         assert same.status_code == 200 and same.json()["id"] == footage
-        wish = {"footage_id": footage, "params": {"preset": "papers"}}
-        self.call("POST /v1/analyses", body=wish)
+        request = {"footage_id": footage, "params": {"preset": "papers"}}
+        self.call("POST /v1/analyses", body=request)
         self.call("POST /v1/analyses", body=self.film, media_type=STREAM)
         analysis = self.call("POST /v1/analyses", body={"video": self.film, "params": "{}"}, media_type=FORM).json()
         library = analysis["library_id"]
@@ -65,8 +65,8 @@ class Walk:
         asked = {"library_id": library, "count": 2, "frames": 10}
         self.call("POST /v1/flocks/preview", body=asked)
         flock = self.call("POST /v1/flocks", body=asked).json()
-        wish = {"footage": self.film, "params": '{"count": 2, "frames": 10}', "analysis": "{}"}
-        self.call("POST /v1/flocks", body=wish, media_type=FORM)
+        request = {"footage": self.film, "params": '{"count": 2, "frames": 10}', "analysis": "{}"}
+        self.call("POST /v1/flocks", body=request, media_type=FORM)
         fish = self.call("POST /v1/fish", body={"library_id": library}).json()
         self.wait_for(flock["job_id"])
         self.wait_for(fish["job_id"])

@@ -26,7 +26,7 @@ PLACE = ROOT / "target/guards"
 SOURCES = PLACE / "sources"
 LONGEST_S = 600
 SWITCH = """
-/// Whether the guard of that name is taken out.
+/// Returns whether the guard with this name is disabled.
 #[doc(hidden)]
 pub fn guard_off(name: &str) -> bool {
     std::env::var("FLOCKREEL_GUARD_OFF").is_ok_and(|off| off == name)
@@ -74,7 +74,7 @@ def lay_out(guards):
         for edit in guard.get("edit", []):
             text = switched.get(edit["file"]) or texts[edit["file"]].decode()
             if text.count(edit["old"]) != 1:
-                sys.exit(f"guards: {guard['name']}: stands {text.count(edit['old'])} times in {edit['file']}: {edit['old']}")
+                sys.exit(f"guards: {guard['name']}: occurs {text.count(edit['old'])} times in {edit['file']}: {edit['old']}")
             new = re.sub(r"\bOFF\b", f'crate::guard_off("{guard["name"]}")', edit["new"])
             switched[edit["file"]] = text.replace(edit["old"], new)
     for root in ("src/lib.rs", "crates/flockreel-core/src/lib.rs"):
@@ -127,7 +127,7 @@ def run(programs, test, off):
     except subprocess.TimeoutExpired:
         return f"did not end in {LONGEST_S} s"
     if kind != "contract" and "running 1 test" not in done.stdout:
-        sys.exit(f"guards: there is no such test: {test}")
+        sys.exit(f"guards: the test does not exist: {test}")
     if done.returncode == 0:
         return None
     return reason(done.stderr + done.stdout)

@@ -154,9 +154,9 @@ fn synthetic_jumps(n_frames: u32, heading: impl Fn(u32) -> f64) -> Vec<Jump> {
         } else {
             heading(to)
         };
-        let alike = (heading(from) - shown).cos() > 0.97 && from.abs_diff(to) > 15;
+        let is_similar = (heading(from) - shown).cos() > 0.97 && from.abs_diff(to) > 15;
         let cost = 500 + (uniform(5, &[4, draw]) * 499.0) as u64;
-        alike.then_some(Jump {
+        is_similar.then_some(Jump {
             from,
             to,
             cost,

@@ -19,6 +19,7 @@ use crate::jobs::clock::now_ms;
 
 /// Longest session, ms: one week. Free choice.
 const SESSION_MS: i64 = 7 * 24 * 3600 * 1000;
+
 /// Token to sign in with.
 #[derive(Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]

@@ -76,8 +76,8 @@ pub(in crate::api) async fn readyz(
         reserve_bytes: state.config.disk_reserve_bytes,
         ok: room_bytes.is_some_and(|free_bytes| free_bytes > state.config.disk_reserve_bytes),
     };
-    let (media_tool, sandbox) = match &state.walls {
-        Ok(walls) => (Some(walls.version.clone()), LayerView::all(walls)),
+    let (media_tool, sandbox) = match &state.media_tool {
+        Ok(status) => (Some(status.version.clone()), LayerView::all(status)),
         Err(_) => (None, Vec::new()),
     };
     let stops = state.context.draining.is_cancelled();
@@ -99,8 +99,8 @@ pub(in crate::api) async fn readyz(
 }
 
 impl LayerView {
-    fn all(walls: &SandboxStatus) -> Vec<LayerView> {
-        let views = walls.layers.iter().map(|(layer, lack)| LayerView {
+    fn all(status: &SandboxStatus) -> Vec<LayerView> {
+        let views = status.layers.iter().map(|(layer, lack)| LayerView {
             name: layer.name(),
             on: lack.is_none(),
             lack: lack.clone(),

@@ -37,7 +37,7 @@ pub(in crate::api) fn add_headers(document: &mut OpenApi) {
             .filter(|_| idempotency::ROUTES.contains(&path.as_str()))
         {
             let meaning = "For a day, the same key and body get the same response, with Idempotent-Replayed: true. \
-                           Another body gets 422; a request that is still running gets 409.";
+                           Another body gets 422. While the first request runs, a repetition gets 409.";
             add_header(post, "Idempotency-Key", meaning);
         }
         let waits = item
@@ -46,8 +46,8 @@ pub(in crate::api) fn add_headers(document: &mut OpenApi) {
             .filter(|post| post.responses.responses.contains_key("202"));
         let get = item.get.as_mut().filter(|_| path == "/v1/jobs/{id}");
         for operation in waits.into_iter().chain(get) {
-            let meaning = "wait=N delays the response until the job ends, at most N seconds (60 at most). If the job \
-                           is done by then, a POST answers 201 with the address of the result in Location.";
+            let meaning = "wait=N delays the response until the job ends, for at most N seconds. N is at most 60. If \
+                           the job is done by then, a POST answers 201 with the address of the result in Location.";
             add_header(operation, "Prefer", meaning);
         }
     }

@@ -69,7 +69,7 @@ impl Film {
         Ok(film)
     }
 
-    /// Returns notes about the file: assumptions, and corrected faults.
+    /// Returns notices about the file: assumptions, and corrected faults.
     pub(super) fn notices(&self) -> &[Notice] {
         &self.probe.notices
     }

@@ -1,6 +1,6 @@
 //! Still pictures as footage: a folder, a zip, or the pages of one TIFF, as microscopes and lab cameras write
 //! them. Libraries without unsafe C code decode each picture on request, under the same limits as films.
-//! Pictures have no frame rate: it comes from a hint or is assumed.
+//! Pictures have no frame rate: the user gives one, or it is assumed.
 
 mod natural_order; // order of numbered names
 mod picture; // decoding of one picture
@@ -162,7 +162,7 @@ impl FrameSource for Pictures {
         }))
     }
 
-    /// Decodes only the wanted pictures.
+    /// Decodes only the selected pictures.
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
         let mut reader = self.source.read(&self.limits, self.alpha_as_gray)?;
         let mut frame = Frame::default();

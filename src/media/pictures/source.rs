@@ -302,7 +302,7 @@ mod tests {
             assert!(is_picture(name), "{name}");
         }
         for name in [
-            "notices.txt",
+            "notes.txt",
             "png",
             ".1.png",
             "__MACOSX/1.png",

@@ -308,7 +308,7 @@ mod tests {
             [&n_bytes.to_be_bytes(), name, &vec![0; n_bytes as usize - 8]].concat()
         };
         let film = [boxed(b"ftyp", 24), boxed(b"mdat", 100), boxed(b"moov", 60)].concat();
-        for (n_kept, selection) in [
+        for (n_kept, expected) in [
             (184, Ending::Whole),
             (170, Ending::AfterPictures),
             (124, Ending::Whole),
@@ -316,7 +316,7 @@ mod tests {
         ] {
             assert_eq!(
                 ending(Container::Mov, &film[..n_kept]),
-                selection,
+                expected,
                 "{n_kept} bytes"
             );
         }

@@ -7,8 +7,8 @@
 mod ending; // detection of files that are cut off
 pub(in crate::media) mod header; // stream headers
 mod packets; // timestamps of packets and pictures
-pub(in crate::media) mod timeline;
-mod timestamps; // correction of a recorder's timestamps // presentation times -> a constant rate
+pub(in crate::media) mod timeline; // presentation times -> a constant rate
+mod timestamps; // correction of a recorder's timestamps
 
 use std::fs::File;
 use std::io::Read;
@@ -75,7 +75,7 @@ pub(in crate::media) struct Probe {
     pub(in crate::media) has_plain_times: bool,
     /// Frames and times at a constant rate.
     pub(in crate::media) timeline: Timeline,
-    /// Notes about the file.
+    /// Notices about the file.
     pub(in crate::media) notices: Vec<Notice>,
 }
 

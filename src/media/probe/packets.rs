@@ -225,7 +225,7 @@ fn split_lines(
         } else if line.len() < MAX_LINE_BYTES {
             line.push(byte);
         } else {
-            return Err(Error::NotAVideo("a packet is told without an end".into()));
+            return Err(Error::NotAVideo("the data of a packet are too long".into()));
         }
     }
     Ok(())

@@ -39,7 +39,7 @@ pub(super) struct Policy {
     pub(super) file_bytes: u64,
     /// The only file that it may read, besides its libraries.
     pub(super) input: Option<PathBuf>,
-    /// The only file that it may write. The file open exist.
+    /// The only file that it may write. The file must exist.
     pub(super) output: Option<PathBuf>,
 }
 
@@ -48,7 +48,7 @@ const OPEN_FILES: u64 = 64;
 
 /// Applies the sandbox to the child that `command` will start. `program_files` describes its program.
 ///
-/// The kernel kills the child when the *thread* that started it ends, so that thread open live as long as the
+/// The kernel kills the child when the *thread* that started it ends, so that thread must live as long as the
 /// process (see `gate`). Fails if a file that the child needs does not exist.
 pub(super) fn apply(
     command: &mut Command,

@@ -81,14 +81,16 @@ impl Bucket {
 
     pub(super) async fn discard(&self, folder: &str) -> Result<(), Error> {
         let objects = self.store.list(Some(&self.path(folder)));
-        let places = objects.map_ok(|object| object.location).boxed();
-        let deleted = self.store.delete_stream(places);
+        let paths = objects.map_ok(|object| object.location).boxed();
+        let deleted = self.store.delete_stream(paths);
         Ok(deleted.try_for_each(async |_| Ok(())).await?)
     }
 
     pub(super) async fn size_bytes(&self, folder: &str, name: &str) -> Result<u64, Error> {
         let path = self.path(&format!("{folder}/{name}"));
-        Ok(self.store.head(&path).await?.size)
+        // As in reading, an absent file is `io::ErrorKind::NotFound`.
+        let head = self.store.head(&path).await.map_err(io::Error::from)?;
+        Ok(head.size)
     }
 
     pub(super) fn read(

@@ -163,14 +163,14 @@ mod tests {
     #[test]
     fn sweep_removes_drafts_of_ended_processes_only() {
         let tmp = tempfile::tempdir().unwrap();
-        let living = Drafts::open(tmp.path()).unwrap();
-        let draft = living.draft("x").unwrap();
-        let dead = Drafts::open(tmp.path()).unwrap();
-        std::mem::forget(dead.draft("y").unwrap());
-        assert_eq!(dead.sweep().unwrap(), 0);
-        drop(dead);
+        let running = Drafts::open(tmp.path()).unwrap();
+        let draft = running.draft("x").unwrap();
+        let ended = Drafts::open(tmp.path()).unwrap();
+        std::mem::forget(ended.draft("y").unwrap());
+        assert_eq!(ended.sweep().unwrap(), 0);
+        drop(ended);
         assert_eq!(n_entries(tmp.path()), 2);
-        assert_eq!(living.sweep().unwrap(), 1);
+        assert_eq!(running.sweep().unwrap(), 1);
         assert!(draft.path().is_dir());
     }
 }

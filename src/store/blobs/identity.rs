@@ -161,12 +161,10 @@ mod tests {
         open(rows.path(), files.path()).await.unwrap();
         assert_eq!(fs::read_to_string(&mark).unwrap().len(), 64);
         let names = fs::read_dir(files.path()).unwrap();
-        let names = names.map(|entry| entry.unwrap().file_name());
-        assert!(
-            !names
-                .into_iter()
-                .any(|name| name.to_string_lossy().contains("new"))
-        );
+        let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        let wanted = ["fish", "flocks", "footage", "libraries", "store-id", "tmp"];
+        assert_eq!(names, wanted, "a temporary file is left");
     }
 
     #[tokio::test]

@@ -156,6 +156,17 @@ impl Blobs {
 
     /// Returns whether a stored file has the size and SHA-256 of its row. Reads the whole file.
     pub async fn is_intact(&self, file: &BlobFile, folder: &str) -> Result<bool, Error> {
+        self.copy(file, folder, &mut tokio::io::sink()).await
+    }
+
+    /// Writes a stored file to `to`. Returns whether it has the size and SHA-256 of its row; a file of another
+    /// size is not copied.
+    pub async fn copy(
+        &self,
+        file: &BlobFile,
+        folder: &str,
+        to: &mut (impl AsyncWrite + Unpin),
+    ) -> Result<bool, Error> {
         let size_bytes = match &self.backend {
             Backend::Local(local) => local.size_bytes(folder, &file.name).await?,
             Backend::Bucket(bucket) => bucket.size_bytes(folder, &file.name).await?,
@@ -163,20 +174,9 @@ impl Blobs {
         if size_bytes != file.size_bytes.unsigned_abs() {
             return Ok(false);
         }
-        let (_, sha256) = self.copy(file, folder, &mut tokio::io::sink()).await?;
-        Ok(sha256 == file.sha256)
-    }
-
-    /// Writes a stored file to `to`. Returns size and SHA-256 of the written bytes.
-    pub async fn copy(
-        &self,
-        file: &BlobFile,
-        folder: &str,
-        to: &mut (impl AsyncWrite + Unpin),
-    ) -> Result<(i64, Vec<u8>), Error> {
-        let n_bytes = file.size_bytes.unsigned_abs();
-        let bytes = self.read(folder, &file.name, 0, n_bytes).await?;
-        Ok(write_and_hash(bytes, to).await?)
+        let bytes = self.read(folder, &file.name, 0, size_bytes).await?;
+        let (n_bytes, sha256) = write_and_hash(bytes, to).await?;
+        Ok((n_bytes, &sha256) == (file.size_bytes, &file.sha256))
     }
 
     /// Returns all stored folders, in no particular order.

@@ -11,7 +11,7 @@ use crate::store::{BlobFile, Error, Store, Transaction, blobs, sql};
 /// Output of a finished job: files that are already stored, and the values of the result's row.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// What the result was made from.
+    /// Input of the job.
     pub source: Source,
     /// Folder in the blob store.
     pub folder: String,
@@ -23,12 +23,12 @@ pub struct Outcome {
     pub summary: String,
 }
 
-/// What a result was made from.
+/// Input from which a job made its result.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Source {
-    /// Nothing: the sample job filmed this footage.
-    Nothing(SampleFootage),
-    /// The footage or library with this id.
+    /// None: a sample job made this footage.
+    Sample(SampleFootage),
+    /// Footage or library with this id.
     Resource(Uuid),
 }
 
@@ -82,7 +82,7 @@ async fn insert(
 ) -> Result<(), Error> {
     let source_id = match &outcome.source {
         Source::Resource(id) => *id,
-        Source::Nothing(sample) => {
+        Source::Sample(sample) => {
             return footage::insert_sample(transaction, lease, outcome, sample, now_ms).await;
         }
     };

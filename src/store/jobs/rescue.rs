@@ -35,15 +35,15 @@ impl Store {
         now_ms: i64,
     ) -> Result<Vec<(JobId, JobState)>, Error> {
         let mut transaction = self.writer.begin().await?;
-        let silent: Vec<(Uuid, i64, bool)> = sql::query(
+        let expired: Vec<(Uuid, i64, bool)> = sql::query(
             "select id, crashes + 1, cancel_requested from jobs \
              where state = 'running' and lease_until_ms < $1 order by id for update skip locked",
         )
         .bind(lease_end_ms)
         .fetch_all(&mut transaction)
         .await?;
-        let mut rescued = Vec::with_capacity(silent.len());
-        for (job, crashes, cancel_requested) in silent {
+        let mut rescued = Vec::with_capacity(expired.len());
+        for (job, crashes, cancel_requested) in expired {
             let state = if cancel_requested {
                 JobState::Cancelled
             } else if crashes >= MAX_CRASHES {

@@ -166,7 +166,7 @@ mod tests {
                 _ => Ok(file.exists()),
             }
         };
-        assert!(!reserve.lend(work).await.unwrap(), "the room was not lent");
+        assert!(!reserve.lend(work).await.unwrap(), "the reserve was kept");
         assert_eq!(n_runs.load(Ordering::Relaxed), 2);
         assert!(blocks() * 512 >= RESERVE_BYTES);
     }
@@ -198,8 +198,8 @@ mod tests {
                 return Err(full());
             }
             let wanted = reserve.require();
-            let patience = std::time::Duration::from_millis(50);
-            let taken = tokio::time::timeout(patience, wanted).await.is_ok();
+            let max_wait = std::time::Duration::from_millis(50);
+            let taken = tokio::time::timeout(max_wait, wanted).await.is_ok();
             was_taken.store(usize::from(taken), Ordering::Relaxed);
             Ok(())
         };

@@ -39,7 +39,7 @@ pub struct NewToken {
 }
 
 /// One stored token.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
 pub struct Token {
     /// Id: the public part of the token.
     pub id: String,
@@ -48,6 +48,7 @@ pub struct Token {
     /// Owner whose data the token gives access to.
     pub owner: Owner,
     /// Permissions.
+    #[sqlx(try_from = "String")]
     pub scope: Scope,
     /// Maximum number of queued and running jobs of the owner.
     pub quota: i64,
@@ -59,17 +60,12 @@ pub struct Token {
     pub revoked_ms: Option<i64>,
 }
 
+/// A token with the hash of its secret.
 #[derive(sqlx::FromRow)]
-struct Row {
-    id: String,
-    name: String,
-    owner: Owner,
+struct HashedToken {
     sha256: Vec<u8>,
-    scope: String,
-    quota: i64,
-    created_ms: i64,
-    expires_ms: Option<i64>,
-    revoked_ms: Option<i64>,
+    #[sqlx(flatten)]
+    token: Token,
 }
 
 impl Store {
@@ -113,10 +109,8 @@ impl Store {
 
     /// Returns all tokens, also expired and revoked ones, oldest first.
     pub async fn list_tokens(&self) -> Result<Vec<Token>, Error> {
-        let rows: Vec<Row> = sql::query("select * from tokens order by created_ms, id")
-            .fetch_all(&self.reader)
-            .await?;
-        rows.into_iter().map(Token::try_from).collect()
+        let rows = sql::query("select * from tokens order by created_ms, id");
+        Ok(rows.fetch_all(&self.reader).await?)
     }
 
     /// Revokes a token and thereby its sessions. Returns false if no token has this id, or if it was revoked
@@ -142,12 +136,10 @@ impl Store {
 
     /// Returns the presented token if its secret is correct and it is valid at `now_ms`.
     pub async fn token(&self, given: &Presented, now_ms: i64) -> Result<Option<Token>, Error> {
-        let row: Option<Row> = sql::query("select * from tokens where id = $1")
-            .bind(&given.id)
-            .fetch_optional(&self.reader)
-            .await?;
-        let right = row.filter(|row| secret::is_same(&row.sha256, &given.sha256));
-        let token = right.map(Token::try_from).transpose()?;
+        let row = sql::query("select * from tokens where id = $1").bind(&given.id);
+        let row: Option<HashedToken> = row.fetch_optional(&self.reader).await?;
+        let known = row.filter(|row| secret::is_same(&row.sha256, &given.sha256));
+        let token = known.map(|row| row.token);
         Ok(token.filter(|token| token.is_valid(now_ms)))
     }
 }
@@ -194,23 +186,13 @@ impl Scope {
     }
 }
 
-impl TryFrom<Row> for Token {
+impl TryFrom<String> for Scope {
     type Error = Error;
 
-    fn try_from(row: Row) -> Result<Token, Error> {
-        let unknown = |value: String| Error::UnknownValue {
+    fn try_from(name: String) -> Result<Scope, Error> {
+        Scope::from_name(&name).ok_or(Error::UnknownValue {
             table: "tokens",
-            value,
-        };
-        Ok(Token {
-            id: row.id,
-            name: row.name,
-            owner: row.owner,
-            scope: Scope::from_name(&row.scope).ok_or_else(|| unknown(row.scope))?,
-            quota: row.quota,
-            created_ms: row.created_ms,
-            expires_ms: row.expires_ms,
-            revoked_ms: row.revoked_ms,
+            value: name,
         })
     }
 }

@@ -1,8 +1,8 @@
 //! The table of sessions: browsers that exchanged a token for a cookie
 //! (docs/explanation/promises.md, "No cross-site writes"). A session is valid no longer than its token.
 
+use super::Token;
 use super::secret::{self, Secret};
-use super::{Row, Token};
 use crate::store::{Error, Store, sql};
 
 impl Store {
@@ -41,7 +41,7 @@ impl Store {
         cookie: &str,
         now_ms: i64,
     ) -> Result<Option<Token>, Error> {
-        let row: Option<Row> = sql::query(
+        let token: Option<Token> = sql::query(
             "select t.* from tokens t join sessions s on s.token_id = t.id \
              where s.sha256 = $1 and s.expires_ms > $2",
         )
@@ -49,7 +49,6 @@ impl Store {
         .bind(now_ms)
         .fetch_optional(&self.reader)
         .await?;
-        let token = row.map(Token::try_from).transpose()?;
         Ok(token.filter(|token| token.is_valid(now_ms)))
     }
 

@@ -113,8 +113,8 @@ impl Store {
                 fs::remove_file(&unverified)?;
                 return Ok(false);
             }
-            Ok(found) if found == (file.size_bytes, file.sha256.clone()) => {}
-            Ok(_) => {
+            Ok(true) => {}
+            Ok(false) => {
                 let name = &file.name;
                 let sentence = format!(
                     "a stored file is damaged, `flockreel check` lists all: {folder}/{name}"
@@ -182,24 +182,14 @@ fn sync_folders(folder: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::store::blobs;
 
     #[tokio::test]
     async fn backup_after_an_interrupted_one_is_complete() {
         let data = tempfile::tempdir().unwrap();
         let store = Store::open(data.path()).await.unwrap();
-        let draft = store.blobs().draft("film").unwrap();
         let bytes: Vec<u8> = (0..24_u32 << 20).map(|k| (k >> 7) as u8).collect();
-        fs::write(draft.path().join("video"), &bytes).unwrap();
-        let file = store.blobs().seal(&draft).unwrap().remove(0);
-        store.blobs().adopt(draft, "footage/a").await.unwrap();
-        sql::query("insert into blobs (folder, name, size_bytes, sha256) values ($1, $2, $3, $4)")
-            .bind("footage/a")
-            .bind("video")
-            .bind(file.size_bytes)
-            .bind(file.sha256.as_slice())
-            .execute(&store.writer)
-            .await
-            .unwrap();
+        store_file(&store, data.path(), &bytes).await;
         let target = data.path().join("copy");
         let partial = partial_path(&target).join("blobs/footage/a");
         let begun = async {
@@ -217,5 +207,31 @@ mod tests {
         let copy = target.join("blobs/footage/a");
         assert_eq!(fs::read(copy.join("video")).unwrap(), bytes);
         assert_eq!(fs::read_dir(copy).unwrap().count(), 1);
+    }
+
+    #[tokio::test]
+    async fn file_with_appended_bytes_is_refused() {
+        let data = tempfile::tempdir().unwrap();
+        let store = Store::open(data.path()).await.unwrap();
+        let path = store_file(&store, data.path(), b"12345").await;
+        let target = data.path().join("copy");
+        let mut file = File::options().append(true).open(path).unwrap();
+        io::Write::write_all(&mut file, b"6").unwrap();
+        let refused = store.back_up(&target).await.err();
+        let sentence = refused.expect("the file is damaged").to_string();
+        assert!(sentence.contains("footage/a/video"), "{sentence}");
+    }
+
+    /// Stores a file with its row and returns its path.
+    async fn store_file(store: &Store, data: &Path, bytes: &[u8]) -> PathBuf {
+        let draft = store.blobs().draft("film").unwrap();
+        fs::write(draft.path().join("video"), bytes).unwrap();
+        let files = store.blobs().seal(&draft).unwrap();
+        store.blobs().adopt(draft, "footage/a").await.unwrap();
+        let mut transaction = store.begin().await.unwrap();
+        let added = blobs::insert(&mut transaction, "footage/a", &files);
+        added.await.unwrap();
+        transaction.commit().await.unwrap();
+        data.join("blobs/footage/a/video")
     }
 }

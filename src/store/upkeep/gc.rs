@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(
             (now.n_drafts, now.n_folders),
             (1, 0),
-            "a stray may be in the making"
+            "a young folder may get its row later"
         );
         let found = store.waste(later, 0).await.unwrap();
         assert_eq!((found.n_drafts, found.n_folders, found.n_bytes), (1, 1, 10));

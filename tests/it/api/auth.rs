@@ -21,7 +21,7 @@ fn cookie_of(answer: &Response) -> String {
 }
 
 #[tokio::test]
-async fn without_a_good_token_nothing_but_the_page_is_answered() {
+async fn only_the_page_is_open_without_a_valid_token() {
     let app = demanding().await;
     let good = app.token(Scope::Read, 1).await;
     let other = if good.ends_with('x') { 'y' } else { 'x' };
@@ -71,7 +71,7 @@ async fn a_revoked_token_is_refused_with_the_next_request() {
 }
 
 #[tokio::test]
-async fn on_this_machine_a_token_is_not_needed_but_a_wrong_one_is_refused() {
+async fn local_requests_need_no_token_but_invalid_tokens_are_refused() {
     let app = TestApp::idle().await;
     app.token(Scope::Read, 1).await;
     assert_eq!(app.get("/v1/jobs").send().await.unwrap().status(), 200);
@@ -81,7 +81,7 @@ async fn on_this_machine_a_token_is_not_needed_but_a_wrong_one_is_refused() {
 }
 
 #[tokio::test]
-async fn a_token_that_may_only_read_makes_and_cancels_nothing() {
+async fn read_token_cannot_create_or_cancel() {
     let mut app = demanding().await;
     let token = app.token(Scope::Read, 1).await;
     app.sign_in(&token);
@@ -120,7 +120,7 @@ async fn a_browser_signs_in_with_a_token_and_out_again() {
 }
 
 #[tokio::test]
-async fn over_https_the_cookie_is_bound_to_its_host() {
+async fn https_cookie_is_bound_to_its_host() {
     let app = demanding().await;
     let token = app.token(Scope::Write, 1).await;
     let answer = app.post("/v1/session").json(&json!({"token": token}));
@@ -140,7 +140,7 @@ async fn over_https_the_cookie_is_bound_to_its_host() {
 }
 
 #[tokio::test]
-async fn another_site_cannot_write_with_a_browsers_cookie() {
+async fn cross_site_write_with_a_session_cookie_is_refused() {
     let app = demanding().await;
     let token = app.token(Scope::Write, 1).await;
     let answer = app
@@ -157,7 +157,7 @@ async fn another_site_cannot_write_with_a_browsers_cookie() {
         ("origin", "null"),
         ("sec-fetch-site", "cross-site"),
         ("sec-fetch-site", "same-site"),
-        ("x-nothing", "said of where it comes from"),
+        ("x-nothing", "no header that names the origin"),
     ] {
         assert_eq!(code_of(write(name, value).await, 403).await, "cross_site");
     }
@@ -167,7 +167,7 @@ async fn another_site_cannot_write_with_a_browsers_cookie() {
 }
 
 #[tokio::test]
-async fn a_token_above_its_quota_is_told_to_come_back() {
+async fn jobs_above_the_quota_are_refused_with_retry_after() {
     let mut app = demanding().await;
     let token = app.token(Scope::Write, 2).await;
     app.sign_in(&token);
@@ -185,7 +185,7 @@ async fn a_token_above_its_quota_is_told_to_come_back() {
 }
 
 #[tokio::test]
-async fn a_token_that_asks_too_often_is_told_to_come_back_and_others_are_answered() {
+async fn rate_limit_applies_to_one_owner_only() {
     let app = TestApp::start(&["--rate", "2"]).await;
     let (hasty, other) = (
         app.token(Scope::Read, 1).await,
@@ -208,7 +208,7 @@ async fn a_token_that_asks_too_often_is_told_to_come_back_and_others_are_answere
 }
 
 #[tokio::test]
-async fn guesses_are_limited_and_a_good_token_is_good_meanwhile() {
+async fn guesses_are_limited_while_valid_tokens_work() {
     let app = demanding().await;
     let good = app.token(Scope::Read, 1).await;
     let guess = async || {
@@ -229,7 +229,7 @@ async fn guesses_are_limited_and_a_good_token_is_good_meanwhile() {
 }
 
 #[tokio::test]
-async fn a_full_queue_is_told_to_everybody_with_the_time_to_come_back() {
+async fn full_queue_refuses_jobs_with_retry_after() {
     let app = TestApp::start(&["--max-queued", "1"]).await;
     let body = json!({"footage_id": app.upload(&TINY).await});
     let first = app.accept("/v1/analyses", body.clone()).await;

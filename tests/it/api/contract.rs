@@ -10,7 +10,7 @@ use crate::common::app::{code_of, routes};
 use crate::common::clip::TINY;
 
 #[tokio::test]
-async fn what_is_not_there_is_said_in_one_form() {
+async fn unknown_paths_and_ids_give_not_found() {
     let app = TestApp::idle().await;
     let id = Uuid::now_v7();
     for path in [
@@ -36,7 +36,7 @@ async fn what_is_not_there_is_said_in_one_form() {
 }
 
 #[tokio::test]
-async fn a_body_that_is_wrong_is_told_what_is_wrong() {
+async fn invalid_bodies_give_the_code_of_their_fault() {
     let app = TestApp::idle().await;
     let (id, path) = (Uuid::now_v7(), "/v1/analyses");
     for (body, status, code) in [
@@ -69,7 +69,7 @@ async fn a_body_that_is_wrong_is_told_what_is_wrong() {
 }
 
 #[tokio::test]
-async fn nothing_served_runs_as_a_page_of_others() {
+async fn every_response_has_security_headers() {
     let app = TestApp::idle().await;
     let id = app.upload(&TINY).await;
     let mut asked: Vec<(Method, String)> = [
@@ -113,7 +113,7 @@ async fn nothing_served_runs_as_a_page_of_others() {
 }
 
 #[tokio::test]
-async fn another_site_cannot_make_a_browser_write_or_read_here() {
+async fn cross_site_requests_and_foreign_host_names_are_refused() {
     let app = TestApp::idle().await;
     for (name, value) in [
         ("origin", "https://evil.example"),
@@ -138,7 +138,7 @@ async fn another_site_cannot_make_a_browser_write_or_read_here() {
 }
 
 #[tokio::test]
-async fn nothing_new_begins_once_the_service_stops() {
+async fn stopping_service_refuses_writes_and_answers_reads() {
     let app = TestApp::idle().await;
     app.context.draining.cancel();
     let answer = app.post("/v1/footage").send().await.unwrap();
@@ -150,7 +150,7 @@ async fn nothing_new_begins_once_the_service_stops() {
 }
 
 #[tokio::test]
-async fn the_document_names_every_call() {
+async fn document_lists_the_main_operations() {
     let app = TestApp::idle().await;
     let document = app.json("/openapi.json").await;
     assert_eq!(document["openapi"], "3.1.0");
@@ -168,7 +168,7 @@ async fn the_document_names_every_call() {
 }
 
 #[tokio::test]
-async fn the_document_has_one_meaning_for_every_name() {
+async fn schemas_have_unique_names_and_joined_fields() {
     let app = TestApp::idle().await;
     let schemas = app.json("/openapi.json").await["components"]["schemas"].clone();
     for (name, field) in [

@@ -77,7 +77,7 @@ async fn folders(app: &TestApp) -> [usize; 4] {
 }
 
 #[tokio::test]
-async fn a_footage_goes_with_all_that_came_of_it_and_can_come_again() {
+async fn deleting_footage_deletes_everything_made_from_it() {
     let app = TestApp::idle().await;
     let paths = family(&app).await;
     assert_eq!(folders(&app).await, [1, 1, 1, 1]);
@@ -94,7 +94,7 @@ async fn a_footage_goes_with_all_that_came_of_it_and_can_come_again() {
 }
 
 #[tokio::test]
-async fn a_library_goes_with_what_was_made_of_it_and_leaves_the_footage() {
+async fn deleting_a_library_keeps_its_footage() {
     let app = TestApp::idle().await;
     let paths = family(&app).await;
     delete(&app, &paths[1]).await;
@@ -107,7 +107,7 @@ async fn a_library_goes_with_what_was_made_of_it_and_leaves_the_footage() {
 }
 
 #[tokio::test]
-async fn a_flock_and_a_fish_go_alone() {
+async fn deleting_a_flock_or_fish_deletes_nothing_else() {
     let app = TestApp::idle().await;
     let paths = family(&app).await;
     delete(&app, &paths[2]).await;
@@ -123,7 +123,7 @@ async fn a_flock_and_a_fish_go_alone() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_running_job_lets_go_when_its_footage_is_deleted() {
+async fn running_job_stores_nothing_after_its_footage_is_deleted() {
     let mut app = TestApp::idle().await;
     app.context.lease = std::time::Duration::from_millis(300);
     let footage = app.upload(&TINY).await;

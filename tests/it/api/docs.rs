@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::common::TestApp;
 
 #[tokio::test]
-async fn every_code_is_explained_where_its_problems_point() {
+async fn every_code_has_an_entry_at_its_type_url() {
     let app = TestApp::idle().await;
     let problem: Value = app
         .get("/v1/nowhere")
@@ -53,7 +53,7 @@ async fn every_code_is_explained_where_its_problems_point() {
 }
 
 #[tokio::test]
-async fn the_description_brings_its_own_files_and_they_are_kept() {
+async fn api_description_uses_only_cacheable_files_of_the_service() {
     let app = TestApp::start(&["--auth", "required"]).await;
     let page = app.get("/docs").send().await.unwrap().text().await.unwrap();
     for (file, media_type) in [

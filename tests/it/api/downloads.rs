@@ -8,7 +8,7 @@ use crate::common::app::code_of;
 use crate::common::clip::TINY;
 
 #[tokio::test]
-async fn a_part_is_exactly_the_bytes_asked_for() {
+async fn range_returns_exactly_the_requested_bytes() {
     let app = TestApp::idle().await;
     let path = format!("/v1/footage/{}/file", app.upload(&TINY).await);
     let size = TINY.len();
@@ -29,7 +29,7 @@ async fn a_part_is_exactly_the_bytes_asked_for() {
 }
 
 #[tokio::test]
-async fn a_part_beyond_the_end_cannot_be_had() {
+async fn range_beyond_the_end_gives_416() {
     let app = TestApp::idle().await;
     let path = format!("/v1/footage/{}/file", app.upload(&TINY).await);
     let range = format!("bytes={}-", TINY.len());
@@ -41,7 +41,7 @@ async fn a_part_beyond_the_end_cannot_be_had() {
 }
 
 #[tokio::test]
-async fn what_the_client_has_is_not_sent_again() {
+async fn known_etag_gives_304_and_if_range_sends_parts_only_of_that_version() {
     let app = TestApp::idle().await;
     let path = format!("/v1/footage/{}/file", app.upload(&TINY).await);
     let head = app.head(&path).send().await.unwrap();
@@ -75,7 +75,7 @@ async fn what_the_client_has_is_not_sent_again() {
 }
 
 #[tokio::test]
-async fn what_is_no_plain_range_of_a_get_is_answered_with_the_whole() {
+async fn unsupported_ranges_get_the_whole_file() {
     let app = TestApp::idle().await;
     let path = format!("/v1/footage/{}/file", app.upload(&TINY).await);
     for range in [
@@ -116,7 +116,7 @@ async fn what_is_no_plain_range_of_a_get_is_answered_with_the_whole() {
 }
 
 #[tokio::test]
-async fn a_tag_among_others_or_a_weak_one_is_known_but_no_weak_one_joins_parts() {
+async fn weak_etags_match_if_none_match_but_not_if_range() {
     let app = TestApp::idle().await;
     let path = format!("/v1/footage/{}/file", app.upload(&TINY).await);
     let head = app.head(&path).send().await.unwrap();

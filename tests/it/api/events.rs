@@ -57,7 +57,7 @@ impl Stream {
     }
 
     /// Returns the job id of the next event, with the job's state or, for a deleted job, `gone`.
-    async fn told(&mut self) -> (Value, String) {
+    async fn next_change(&mut self) -> (Value, String) {
         let (name, _, data) = self.event().await.expect("the stream has ended");
         match name.as_str() {
             "job" => (
@@ -80,7 +80,7 @@ async fn cancel(app: &TestApp, job: &Value) {
 }
 
 #[tokio::test]
-async fn one_stream_tells_of_all_jobs_of_its_caller_and_of_nobody_elses() {
+async fn stream_reports_all_jobs_of_its_caller_and_no_others() {
     let mut app = TestApp::start(&["--auth", "required"]).await;
     let (owner, stranger) = (
         app.token(Scope::Write, 9).await,
@@ -95,33 +95,42 @@ async fn one_stream_tells_of_all_jobs_of_its_caller_and_of_nobody_elses() {
     let footage = app.upload(&TINY).await;
     let first = queued(&app, &footage).await;
     let mut stream = Stream::open(app.get("/v1/events")).await;
-    assert_eq!(stream.told().await, (first.clone(), "queued".to_owned()));
+    assert_eq!(
+        stream.next_change().await,
+        (first.clone(), "queued".to_owned())
+    );
     let second = queued(&app, &footage).await;
-    assert_eq!(stream.told().await, (second.clone(), "queued".to_owned()));
+    assert_eq!(
+        stream.next_change().await,
+        (second.clone(), "queued".to_owned())
+    );
     cancel(&app, &first).await;
-    assert_eq!(stream.told().await, (first.clone(), "cancelled".to_owned()));
+    assert_eq!(
+        stream.next_change().await,
+        (first.clone(), "cancelled".to_owned())
+    );
     // A job that is created and cancelled between two polls.
     let third = queued(&app, &footage).await;
     cancel(&app, &third).await;
-    let mut told = stream.told().await;
-    if told == (third.clone(), "queued".to_owned()) {
-        told = stream.told().await;
+    let mut change = stream.next_change().await;
+    if change == (third.clone(), "queued".to_owned()) {
+        change = stream.next_change().await;
     }
-    assert_eq!(told, (third.clone(), "cancelled".to_owned()));
+    assert_eq!(change, (third.clone(), "cancelled".to_owned()));
     // A client that asks for the whole history also receives only events of its own jobs.
     let all = app.get("/v1/events").header("last-event-id", "1");
     let mut all = Stream::open(all).await;
     for expected in [&first, &second, &third] {
-        assert_eq!(all.told().await.0, *expected);
+        assert_eq!(all.next_change().await.0, *expected);
     }
     let deleted = app.delete(&format!("/v1/footage/{footage}")).send().await;
     assert_eq!(deleted.unwrap().status(), 204);
-    assert_eq!(stream.told().await, (second, "gone".to_owned()));
+    assert_eq!(stream.next_change().await, (second, "gone".to_owned()));
     app.assert_sound().await;
 }
 
 #[tokio::test]
-async fn whoever_comes_back_is_told_what_ended_meanwhile() {
+async fn reconnecting_client_gets_missed_events() {
     let app = TestApp::idle().await;
     let footage = app.upload(&TINY).await;
     let job = queued(&app, &footage).await;
@@ -131,12 +140,12 @@ async fn whoever_comes_back_is_told_what_ended_meanwhile() {
     cancel(&app, &job).await;
     let cut = app.get("/v1/events").header("last-event-id", &last_id);
     let mut stream = Stream::open(cut).await;
-    assert_eq!(stream.told().await, (job, "cancelled".to_owned()));
+    assert_eq!(stream.next_change().await, (job, "cancelled".to_owned()));
     drop(stream);
     let mut fresh = Stream::open(app.get("/v1/events")).await;
     let other = queued(&app, &footage).await;
     assert_eq!(
-        fresh.told().await,
+        fresh.next_change().await,
         (other, "queued".to_owned()),
         "only what is under way"
     );
@@ -144,7 +153,7 @@ async fn whoever_comes_back_is_told_what_ended_meanwhile() {
 }
 
 #[tokio::test]
-async fn a_stream_ends_with_the_token_or_the_session_that_opened_it() {
+async fn stream_ends_with_its_token_or_session() {
     let app = TestApp::start(&["--auth", "required"]).await;
     let (token, other) = (
         app.token(Scope::Read, 1).await,
@@ -180,7 +189,7 @@ async fn a_stream_ends_with_the_token_or_the_session_that_opened_it() {
 }
 
 #[tokio::test]
-async fn a_quiet_stream_shows_every_fifteen_seconds_that_it_lives() {
+async fn quiet_stream_sends_keep_alive_comments() {
     let app = TestApp::idle().await;
     let mut stream = Stream::open(app.get("/v1/events")).await;
     assert_eq!(stream.block().await.unwrap(), "retry: 1000");

@@ -10,7 +10,7 @@ use crate::common::clip::{SWIM, SWIM_MASKS, TINY};
 use crate::common::pictures::{stack_of_grays, zip_of_grays};
 
 #[tokio::test]
-async fn a_film_is_stored_as_it_was_sent() {
+async fn film_is_stored_unchanged() {
     let app = TestApp::idle().await;
     let answer = app
         .post("/v1/footage?name=my%20fish.mp4")
@@ -30,7 +30,7 @@ async fn a_film_is_stored_as_it_was_sent() {
 }
 
 #[tokio::test]
-async fn a_zip_and_a_stack_of_pictures_are_footage_and_their_rate_is_a_parameter() {
+async fn zip_and_tiff_of_pictures_are_footage_whose_rate_is_a_parameter() {
     let app = TestApp::idle().await;
     for (media_type, body) in [
         ("application/zip", zip_of_grays(12)),
@@ -45,8 +45,8 @@ async fn a_zip_and_a_stack_of_pictures_are_footage_and_their_rate_is_a_parameter
         let answer = body_of_one_call.body(body).send().await.unwrap();
         let analysis = json_of(answer, StatusCode::ACCEPTED).await;
         assert_eq!(analysis["footage_id"], footage["id"]);
-        let wish = json!({"footage_id": footage["id"], "params": {"fps": 12.5, "pixel_aspect": 2}});
-        app.accept("/v1/analyses", wish).await;
+        let good = json!({"footage_id": footage["id"], "params": {"fps": 12.5, "pixel_aspect": 2}});
+        app.accept("/v1/analyses", good).await;
         let bad = json!({"footage_id": footage["id"], "params": {"fps": 0}});
         let answer = app.post("/v1/analyses").json(&bad).send().await.unwrap();
         assert_eq!(code_of(answer, 422).await, "invalid_params");
@@ -55,7 +55,7 @@ async fn a_zip_and_a_stack_of_pictures_are_footage_and_their_rate_is_a_parameter
 }
 
 #[tokio::test]
-async fn the_same_bytes_again_are_the_same_footage() {
+async fn equal_upload_returns_the_stored_footage() {
     let app = TestApp::idle().await;
     let id = app.upload(&TINY).await;
     let form = Form::new().part("video", Part::bytes(TINY.clone()));
@@ -67,7 +67,7 @@ async fn the_same_bytes_again_are_the_same_footage() {
 }
 
 #[tokio::test]
-async fn the_same_bytes_at_the_same_time_are_one_footage() {
+async fn concurrent_equal_uploads_become_one_footage() {
     let app = TestApp::idle().await;
     let send = || app.post("/v1/footage").body(TINY.clone()).send();
     let (a, b, c) = tokio::join!(send(), send(), send());
@@ -82,7 +82,7 @@ async fn the_same_bytes_at_the_same_time_are_one_footage() {
 }
 
 #[tokio::test]
-async fn what_is_no_film_is_refused_and_leaves_nothing_behind() {
+async fn refused_uploads_leave_no_files() {
     let app = TestApp::idle().await;
     let playlist = b"#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\n/etc/passwd\n#EXT-X-ENDLIST\n";
     let cut_off = TINY[..TINY.len() / 2].to_vec();
@@ -110,7 +110,7 @@ async fn what_is_no_film_is_refused_and_leaves_nothing_behind() {
 }
 
 #[tokio::test]
-async fn more_bytes_than_the_limit_are_refused_however_they_come() {
+async fn body_above_the_limit_is_refused_raw_and_in_a_form() {
     let app = TestApp::start(&["--max-upload-bytes", "1000"]).await;
     let declared = app.post("/v1/footage").body(vec![0; 1001]).send().await;
     assert_eq!(code_of(declared.unwrap(), 413).await, "too_large");
@@ -121,7 +121,7 @@ async fn more_bytes_than_the_limit_are_refused_however_they_come() {
 }
 
 #[tokio::test]
-async fn a_form_must_hold_a_video_and_nothing_unknown() {
+async fn form_without_video_or_with_unknown_fields_is_refused() {
     let app = TestApp::idle().await;
     for form in [
         Form::new(),
@@ -148,15 +148,6 @@ async fn a_background_of_another_size_is_refused() {
     app.assert_sound().await;
 }
 
-#[tokio::test]
-async fn a_packed_body_is_refused() {
-    let app = TestApp::idle().await;
-    let answer = app.post("/v1/footage").header("content-encoding", "gzip");
-    let answer = answer.body(TINY.clone()).send().await.unwrap();
-    assert_eq!(code_of(answer, 415).await, "unsupported_media_type");
-    app.assert_sound().await;
-}
-
 /// Returns a form with a film and its mask film.
 fn with_masks(video: &[u8], masks: &[u8]) -> Form {
     Form::new()
@@ -165,7 +156,7 @@ fn with_masks(video: &[u8], masks: &[u8]) -> Form {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn masks_that_come_with_a_film_are_taken_instead_of_its_colors() {
+async fn masks_replace_detection_by_color() {
     let app = TestApp::working().await;
     let plain = app.upload(&SWIM).await;
     let form = with_masks(&SWIM, &SWIM_MASKS);
@@ -194,7 +185,7 @@ async fn masks_that_come_with_a_film_are_taken_instead_of_its_colors() {
 }
 
 #[tokio::test]
-async fn masks_of_another_size_are_refused_at_the_door() {
+async fn masks_of_another_size_are_refused_on_upload() {
     let app = TestApp::idle().await;
     let answer = app.send_form("/v1/footage", with_masks(&SWIM, &TINY)).await;
     assert_eq!(code_of(answer, 422).await, "masks_differ");

@@ -35,7 +35,7 @@ async fn n_jobs(app: &TestApp) -> usize {
 }
 
 #[tokio::test]
-async fn the_same_request_again_gets_the_same_answer_and_another_one_422() {
+async fn repeated_request_gets_the_stored_response_and_another_body_422() {
     let app = TestApp::idle().await;
     let body = json!({"footage_id": app.upload(&TINY).await});
     let first = analyze(&app, &body).await;
@@ -56,7 +56,7 @@ async fn the_same_request_again_gets_the_same_answer_and_another_one_422() {
 }
 
 #[tokio::test]
-async fn a_refusal_is_the_same_refusal_again_and_an_upload_the_same_footage() {
+async fn refusals_and_uploads_are_replayed() {
     let app = TestApp::idle().await;
     for _ in 0..2 {
         let refused = analyze(&app, &json!({"footage_id": uuid::Uuid::nil()})).await;
@@ -76,7 +76,7 @@ async fn a_refusal_is_the_same_refusal_again_and_an_upload_the_same_footage() {
 }
 
 #[tokio::test]
-async fn while_the_first_request_runs_the_second_is_told_so() {
+async fn request_with_a_key_in_use_gets_409() {
     let app = TestApp::idle().await;
     let body = json!({"footage_id": app.upload(&TINY).await});
     let held = app.context.store.begin_key(&scope(), None, now_ms()).await;
@@ -109,7 +109,7 @@ async fn crashed_between(app: &TestApp, footage: &str) -> Value {
 }
 
 #[tokio::test]
-async fn a_crash_between_the_job_and_its_answer_makes_no_second_job() {
+async fn crash_before_the_response_makes_no_second_job() {
     let app = TestApp::idle().await;
     let footage = app.upload(&TINY).await;
     let made = crashed_between(&app, &footage).await;
@@ -122,7 +122,7 @@ async fn a_crash_between_the_job_and_its_answer_makes_no_second_job() {
 }
 
 #[tokio::test]
-async fn a_key_of_before_a_crash_does_not_serve_another_request() {
+async fn key_from_before_a_crash_refuses_another_body() {
     let app = TestApp::idle().await;
     let footage = app.upload(&TINY).await;
     crashed_between(&app, &footage).await;
@@ -134,7 +134,7 @@ async fn a_key_of_before_a_crash_does_not_serve_another_request() {
 }
 
 #[tokio::test]
-async fn a_key_is_its_owners_whatever_the_token() {
+async fn key_belongs_to_the_owner_not_to_the_token() {
     let mut app = TestApp::start(&["--auth", "required"]).await;
     let first = app.token(TokenScope::Write, 9).await;
     let owner = Owner(first.split('_').nth(1).unwrap().to_owned());
@@ -169,7 +169,7 @@ async fn a_key_is_its_owners_whatever_the_token() {
 }
 
 #[tokio::test]
-async fn an_upload_is_begun_once_and_another_length_is_another_request() {
+async fn creating_an_upload_is_idempotent() {
     let app = TestApp::idle().await;
     let begin = async |size_bytes: usize| {
         let request = app.post("/v1/uploads").header("idempotency-key", "k-3");

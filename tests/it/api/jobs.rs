@@ -23,7 +23,7 @@ async fn analysis_of(app: &TestApp, footage_id: &str) -> Value {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_film_that_is_refused_shows_why() {
+async fn refused_film_has_a_picture_of_the_reason() {
     let mut app = TestApp::working().await;
     let (owner, stranger) = (
         app.token(Scope::Write, 9).await,
@@ -55,7 +55,7 @@ async fn a_film_that_is_refused_shows_why() {
 }
 
 #[tokio::test]
-async fn an_accepted_job_says_where_it_and_its_result_are() {
+async fn accepted_job_has_links_to_itself_and_its_result() {
     let app = TestApp::idle().await;
     let footage_id = app.upload(&TINY).await;
     let answer = app
@@ -95,7 +95,7 @@ async fn a_queued_job_is_cancelled_once() {
 }
 
 #[tokio::test]
-async fn result_that_never_comes_is_answered_with_the_reason_and_the_job() {
+async fn lost_result_gives_the_code_and_the_link_of_its_job() {
     let app = TestApp::idle().await;
     let footage_id = app.upload(&TINY).await;
     let failed = analysis_of(&app, &footage_id).await;
@@ -128,7 +128,7 @@ async fn result_that_never_comes_is_answered_with_the_reason_and_the_job() {
 }
 
 #[tokio::test]
-async fn events_tell_every_state_and_end_with_the_last() {
+async fn job_events_show_every_state_and_end_with_the_last() {
     let app = TestApp::idle().await;
     let job = queued(&app).await;
     let path = format!("/v1/jobs/{}", job["job_id"].as_str().unwrap());
@@ -173,7 +173,7 @@ async fn lists_are_paged_from_the_newest() {
 }
 
 #[tokio::test]
-async fn a_flock_needs_a_library_that_is_there_or_coming() {
+async fn flock_needs_an_existing_or_queued_library() {
     let app = TestApp::idle().await;
     let unknown = json!({"library_id": uuid::Uuid::now_v7(), "count": 2});
     let answer = app.post("/v1/flocks").json(&unknown).send().await.unwrap();

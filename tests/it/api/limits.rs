@@ -36,7 +36,7 @@ fn head(method: &str, address: &str, more: &str) -> Vec<u8> {
 }
 
 #[tokio::test]
-async fn heads_and_addresses_have_a_longest() {
+async fn heads_and_addresses_have_a_maximum_length() {
     let app = TestApp::idle().await;
     let large = head(
         "GET",
@@ -55,7 +55,7 @@ async fn heads_and_addresses_have_a_longest() {
 }
 
 #[tokio::test]
-async fn a_body_that_is_announced_too_large_is_refused_before_it_comes() {
+async fn too_large_content_length_is_refused_before_the_body() {
     let app = TestApp::idle().await;
     for kind in [
         "application/octet-stream",
@@ -69,7 +69,7 @@ async fn a_body_that_is_announced_too_large_is_refused_before_it_comes() {
 }
 
 #[tokio::test]
-async fn a_body_that_does_not_say_how_long_it_is_ends_at_the_limit() {
+async fn chunked_body_is_cut_off_at_the_limit() {
     let app = TestApp::start(&["--max-upload-bytes", "1000"]).await;
     let more = "transfer-encoding: chunked\r\n";
     let chunk = [&b"258\r\n"[..], &[7; 600], b"\r\n"].concat();
@@ -82,7 +82,7 @@ async fn a_body_that_does_not_say_how_long_it_is_ends_at_the_limit() {
 }
 
 #[tokio::test]
-async fn a_length_that_is_a_lie_leaves_nothing_behind() {
+async fn wrong_content_length_leaves_no_files() {
     let app = TestApp::idle().await;
     let more = |length: usize| format!("content-length: {length}\r\nconnection: close\r\n");
     let less = head("POST", "/v1/footage", &more(TINY.len() / 2));
@@ -115,7 +115,7 @@ async fn a_length_that_is_a_lie_leaves_nothing_behind() {
 }
 
 #[tokio::test]
-async fn a_packed_body_is_refused_on_every_route() {
+async fn compressed_body_is_refused_on_every_route() {
     let app = TestApp::idle().await;
     for path in [
         "/v1/footage",
@@ -136,7 +136,7 @@ async fn a_packed_body_is_refused_on_every_route() {
 }
 
 #[tokio::test]
-async fn a_form_of_ten_thousand_parts_is_refused_at_the_first_that_is_not_asked_for() {
+async fn form_of_ten_thousand_parts_is_refused_at_the_first_unknown_one() {
     let app = TestApp::idle().await;
     let part = |name: &str, value: &[u8]| {
         let head = format!("--x\r\ncontent-disposition: form-data; name=\"{name}\"\r\n\r\n");

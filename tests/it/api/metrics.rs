@@ -27,7 +27,7 @@ async fn metrics(app: &TestApp) -> String {
 }
 
 #[tokio::test]
-async fn the_metrics_tell_the_queue_the_bytes_the_requests_and_how_jobs_ended() {
+async fn metrics_cover_the_queue_the_store_requests_and_ended_jobs() {
     let app = TestApp::idle().await;
     let footage = app.upload(&TINY).await;
     for _ in 0..2 {
@@ -86,7 +86,7 @@ async fn the_metrics_tell_the_queue_the_bytes_the_requests_and_how_jobs_ended() 
 }
 
 #[tokio::test]
-async fn where_tokens_are_demanded_only_an_administrator_reads_the_metrics() {
+async fn metrics_need_an_admin_token_if_tokens_are_required() {
     let mut app = TestApp::start(&["--auth", "required"]).await;
     let (writer, admin) = (
         app.token(Scope::Write, 1).await,
@@ -103,7 +103,7 @@ async fn where_tokens_are_demanded_only_an_administrator_reads_the_metrics() {
 }
 
 #[tokio::test]
-async fn every_answer_bears_the_id_of_its_request() {
+async fn every_response_has_a_request_id() {
     let app = TestApp::idle().await;
     let ask = async |id: &str| {
         let answer = app

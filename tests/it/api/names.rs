@@ -39,7 +39,7 @@ fn names() -> Vec<String> {
 }
 
 #[tokio::test]
-async fn whatever_a_film_is_called_its_file_is_called_by_us() {
+async fn file_names_from_clients_are_only_labels() {
     let app = TestApp::idle().await;
     for (k, name) in names().into_iter().enumerate() {
         // Make each film different, because equal films are stored once.

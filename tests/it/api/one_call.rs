@@ -9,7 +9,7 @@ use crate::common::app::{code_of, json_of};
 use crate::common::clip::{SWIM, TINY};
 
 #[tokio::test]
-async fn a_film_sent_to_be_measured_is_stored_and_measured() {
+async fn analysis_request_with_a_film_stores_it_first() {
     let app = TestApp::idle().await;
     let raw = app
         .post("/v1/analyses?name=a.mp4")
@@ -35,7 +35,7 @@ async fn a_film_sent_to_be_measured_is_stored_and_measured() {
 }
 
 #[tokio::test]
-async fn a_form_may_be_larger_than_any_json() {
+async fn form_may_exceed_the_limit_of_json() {
     let app = TestApp::idle().await;
     let form = Form::new().part("video", Part::bytes(vec![7; 3 << 20]));
     let answer = app.send_form("/v1/footage", form).await;

@@ -21,7 +21,7 @@ async fn with_library() -> (TestApp, String, String) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_preview_says_at_once_what_the_flock_will_be_and_leaves_nothing() {
+async fn preview_equals_the_flock_and_stores_nothing() {
     let (app, _, library_id) = with_library().await;
     let request = json!({"library_id": library_id, "count": 3, "frames": 20, "seed": 7});
     let preview = app
@@ -45,7 +45,7 @@ async fn a_preview_says_at_once_what_the_flock_will_be_and_leaves_nothing() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_preview_of_too_many_of_nothing_or_of_what_is_not_there_is_refused() {
+async fn invalid_previews_are_refused() {
     let (app, _, library_id) = with_library().await;
     let other = uuid::Uuid::now_v7();
     for (request, status, code) in [
@@ -73,7 +73,7 @@ async fn a_preview_of_too_many_of_nothing_or_of_what_is_not_there_is_refused() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn distances_come_as_numbers_and_not_again_to_who_has_them() {
+async fn distance_array_matches_the_transitions_and_is_cacheable() {
     let (app, library, _) = with_library().await;
     let path = format!("{library}/distance.npy");
     let answer = app.get(&path).send().await.unwrap();

@@ -79,7 +79,7 @@ async fn film_of(app: &TestApp, answer: &Response) -> Vec<u8> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_upload_cut_at_every_tenth_goes_on_and_is_whole() {
+async fn interrupted_upload_continues_and_is_complete() {
     let app = TestApp::idle().await;
     let (film, size) = (&*SWIM, SWIM.len());
     let path = begin(&app, size).await;
@@ -106,7 +106,7 @@ async fn an_upload_cut_at_every_tenth_goes_on_and_is_whole() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_newcomer_does_not_wait_for_a_connection_that_hangs() {
+async fn new_request_takes_an_upload_over_from_a_hanging_one() {
     let app = TestApp::idle().await;
     let path = begin(&app, TINY.len()).await;
     let hanging = send_some(&app, &path, 0, TINY.len(), &TINY[..100]).await;
@@ -120,7 +120,7 @@ async fn a_newcomer_does_not_wait_for_a_connection_that_hangs() {
 }
 
 #[tokio::test]
-async fn bytes_for_elsewhere_are_refused() {
+async fn wrong_offset_length_or_version_is_refused() {
     let app = TestApp::idle().await;
     let path = begin(&app, TINY.len()).await;
     let answer = piece(&app, &path, 7, &TINY[7..]).send().await.unwrap();
@@ -140,7 +140,7 @@ async fn bytes_for_elsewhere_are_refused() {
 }
 
 #[tokio::test]
-async fn a_piece_with_a_wrong_checksum_never_came() {
+async fn part_with_a_wrong_checksum_is_not_stored() {
     let app = TestApp::idle().await;
     let path = begin(&app, TINY.len()).await;
     let with_sum = |bytes: &[u8], of: &[u8]| {
@@ -156,7 +156,7 @@ async fn a_piece_with_a_wrong_checksum_never_came() {
 }
 
 #[tokio::test]
-async fn an_upload_ends_when_it_is_given_up_refused_or_too_old() {
+async fn cancelled_refused_and_expired_uploads_are_deleted() {
     let app = TestApp::idle().await;
     let gone = async |path: &str| tus(&app, "HEAD", path).send().await.unwrap().status() == 404;
     let given_up = begin(&app, 10).await;
@@ -179,7 +179,7 @@ async fn an_upload_ends_when_it_is_given_up_refused_or_too_old() {
 }
 
 #[tokio::test]
-async fn a_small_film_can_come_with_the_creation_and_is_known_again() {
+async fn film_may_be_sent_when_the_upload_is_created() {
     let app = TestApp::idle().await;
     let known = app.upload(&TINY).await;
     let whole = tus(&app, "POST", "/v1/uploads").header("upload-length", TINY.len());

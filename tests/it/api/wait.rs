@@ -11,7 +11,7 @@ use crate::common::app::json_of;
 use crate::common::clip::{SWIM, TINY};
 
 #[tokio::test]
-async fn a_job_that_does_not_end_is_waited_for_no_longer_than_asked() {
+async fn wait_ends_after_the_requested_time() {
     let app = TestApp::idle().await;
     let body = json!({"footage_id": app.upload(&TINY).await});
     let start = Instant::now();
@@ -36,7 +36,7 @@ async fn a_job_that_does_not_end_is_waited_for_no_longer_than_asked() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_job_that_ends_in_time_is_answered_with_its_result() {
+async fn job_that_ends_in_time_gives_201_with_its_result() {
     let app = TestApp::idle().await;
     let body = json!({"footage_id": app.upload(&SWIM).await});
     let workers = Supervisor::start(app.context.clone(), 1);

@@ -24,7 +24,7 @@ fn pairs() -> Vec<(Pose, Pose)> {
 }
 
 #[test]
-fn the_animal_is_found_in_every_frame_within_a_pixel() {
+fn centroid_is_within_a_pixel_in_every_frame() {
     let (film, _, _) = filmed();
     let pairs = pairs();
     assert_eq!(pairs.len(), film.truth().frames.len());
@@ -37,7 +37,7 @@ fn the_animal_is_found_in_every_frame_within_a_pixel() {
 }
 
 #[test]
-fn the_head_is_where_it_is_in_all_frames_that_show_the_fish_at_length() {
+fn heading_is_right_in_frames_that_show_the_fish_at_length() {
     let at_length = |(_, want): &&(Pose, Pose)| want.gamma_rad.unwrap().cos() > 0.5;
     let gap = |(got, want): &(Pose, Pose)| {
         wrap_rad(got.heading_rad.unwrap() - want.heading_rad.unwrap()).abs()
@@ -67,7 +67,7 @@ fn depth_is_within_a_tenth_of_the_tank() {
 }
 
 #[test]
-fn the_analysis_is_the_same_for_any_number_of_threads() {
+fn analysis_is_equal_for_any_number_of_threads() {
     let (film, library, params) = filmed();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
@@ -82,7 +82,7 @@ fn the_analysis_is_the_same_for_any_number_of_threads() {
 }
 
 #[test]
-fn a_flock_of_the_film_shows_only_frames_that_may_follow_each_other() {
+fn flock_uses_only_transitions_of_the_library() {
     let (_, library, _) = filmed();
     let flock = plan_flock(library, &small_flock(), &Silent).unwrap();
     for individual in &flock.individuals {
@@ -98,7 +98,7 @@ fn a_flock_of_the_film_shows_only_frames_that_may_follow_each_other() {
 }
 
 #[test]
-fn a_flock_is_the_same_for_any_number_of_threads() {
+fn flock_is_equal_for_any_number_of_threads() {
     let (_, library, _) = filmed();
     let made = |n_threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new()

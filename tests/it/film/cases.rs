@@ -14,7 +14,7 @@ fn measured(name: &str, film: &Staged) -> flockreel_core::library::Library {
 }
 
 #[test]
-fn light_that_is_dimmed_switched_or_flickers_changes_nothing() {
+fn dimmed_switched_and_flickering_light_is_corrected() {
     let dimmed = |k: usize, _| 1.0 - 0.5 * (k as f64 / 75.0 - 0.5).clamp(0.0, 1.0);
     measured("dimmed", &Staged::plain().with_light(dimmed));
     let switched = |k: usize, _| if (50..110).contains(&k) { 0.4 } else { 1.0 };
@@ -24,7 +24,7 @@ fn light_that_is_dimmed_switched_or_flickers_changes_nothing() {
 }
 
 #[test]
-fn a_camera_that_is_bumped_is_followed() {
+fn bumped_camera_is_followed() {
     measured(
         "bumped",
         &Staged::plain().shifted(|k| if k < 70 { [0, 0] } else { [4, 2] }),
@@ -32,7 +32,7 @@ fn a_camera_that_is_bumped_is_followed() {
 }
 
 #[test]
-fn an_animal_that_rests_for_most_of_the_film_is_found_where_it_rests() {
+fn animal_that_rests_for_most_of_the_film_is_found() {
     let rests = (0..N_FRAMES).map(|k| k.max(90)).collect();
     measured("rests first", &Staged::in_order(rests));
     let rests = (0..N_FRAMES).map(|k| (k + 90).min(N_FRAMES - 1)).collect();
@@ -40,7 +40,7 @@ fn an_animal_that_rests_for_most_of_the_film_is_found_where_it_rests() {
 }
 
 #[test]
-fn frames_of_no_scene_are_left_out_and_told() {
+fn foreign_frames_are_left_out_and_counted() {
     let film = Staged::plain().after(15, [0; 3]);
     let library = measured("black lead", &film);
     assert_eq!(library.stats.n_foreign_frames, 15);
@@ -48,7 +48,7 @@ fn frames_of_no_scene_are_left_out_and_told() {
 }
 
 #[test]
-fn a_cable_is_not_the_animal() {
+fn cable_is_no_part_of_the_animal() {
     let film = Staged::plain();
     let scene = film.scene().clone();
     let film = film.with_drawing(|_, picture, [x, y]| {
@@ -70,7 +70,7 @@ fn a_cable_is_not_the_animal() {
 }
 
 #[test]
-fn a_hand_that_was_there_first_is_not_the_animal_but_told() {
+fn hand_at_the_start_is_reported_and_not_measured() {
     let film = Staged::plain().with_drawing(|k, picture, _| {
         let down = 150 - (k as i64 - 20).max(0) * 6;
         for y in 0..down.clamp(0, i64::from(HEIGHT)) as u32 {
@@ -91,13 +91,13 @@ fn a_hand_that_was_there_first_is_not_the_animal_but_told() {
     assert!(far.len() <= 3, "far off in {far:?}");
     let others = &library.poses.other_movers;
     let hand = others.iter().find(|m| m.kind == MoverKind::FromBorder);
-    let hand = hand.unwrap_or_else(|| panic!("nobody told of the hand: {others:?}"));
+    let hand = hand.unwrap_or_else(|| panic!("the hand is not reported: {others:?}"));
     // Until the hand moves, it may be part of the background.
     assert!(hand.from_s < 1.0 && hand.to_s < 2.0, "{hand:?}");
 }
 
 #[test]
-fn the_mirror_image_in_the_surface_is_not_a_second_animal() {
+fn mirror_image_in_the_surface_is_no_second_animal() {
     let surface = HEIGHT / 3;
     let film = Staged::plain().with_drawing(|_, picture, _| {
         for y in 0..surface {
@@ -139,7 +139,7 @@ fn refused(name: &str, film: &Staged) -> (&'static str, f64) {
 }
 
 #[test]
-fn a_hand_held_camera_is_refused_for_its_own_reason() {
+fn hand_held_camera_is_refused_as_moving() {
     let sway = |k: usize, rate: f64| (14.0 * (k as f64 * rate).sin()) as i64;
     let film = Staged::plain().shifted(|k| [sway(k, 0.14), sway(k, 0.22)]);
     let (code, at_s) = refused("hand-held", &film);

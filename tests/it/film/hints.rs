@@ -1,4 +1,4 @@
-//! ReadOptions of the user: the part of the film to analyze, a point on the animal, and boxes to ignore.
+//! Hints of the user: the part of the film to analyze, a point on the animal, and boxes to ignore.
 
 use flockreel_core::analysis::params::{AnimalAtParam, IgnoreParam};
 use flockreel_core::analysis::{Error, Params};
@@ -33,7 +33,7 @@ fn two_fish() -> Staged {
 }
 
 #[test]
-fn of_two_animals_the_one_that_is_pointed_at_is_followed() {
+fn animal_at_selects_one_of_two_animals() {
     let film = two_fish();
     let turned = |[x, y]: [f64; 2]| [f64::from(WIDTH) - x, f64::from(HEIGHT + LOWER_PX) - y];
     match film.analyzed(&Params::default()) {
@@ -45,7 +45,10 @@ fn of_two_animals_the_one_that_is_pointed_at_is_followed() {
                 assert_eq!(n_there, 1, "{point:?} in {boxes_px:?}");
             }
         }
-        other => panic!("it was not told that there are two: {:?}", other.err()),
+        other => panic!(
+            "the film is not refused for several animals: {:?}",
+            other.err()
+        ),
     }
     let point = film.centroid_px(60).expect("it is shown");
     let other = turned(point);
@@ -73,7 +76,7 @@ fn of_two_animals_the_one_that_is_pointed_at_is_followed() {
 }
 
 #[test]
-fn pointing_at_nothing_is_told() {
+fn point_without_an_animal_is_refused() {
     let film = Staged::plain();
     let [x, y] = film.centroid_px(60).expect("it is shown");
     let (width, height) = (f64::from(WIDTH), f64::from(HEIGHT));
@@ -96,7 +99,7 @@ fn pointing_at_nothing_is_told() {
 }
 
 #[test]
-fn what_blinks_in_an_ignored_box_is_not_told_of() {
+fn ignored_box_hides_a_blinking_object() {
     let film = Staged::plain().with_drawing(|k, picture, _| {
         for y in 5..35 {
             for x in 5..65 {
@@ -132,7 +135,7 @@ fn what_blinks_in_an_ignored_box_is_not_told_of() {
 }
 
 #[test]
-fn a_part_of_a_film_is_a_film_of_its_own() {
+fn part_has_the_frames_of_its_time_span() {
     let film = Staged::plain();
     let part = Part::new(&film, Some(1.0), Some(3.0));
     assert_eq!(part.format().n_frames_hint, 60);

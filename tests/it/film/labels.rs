@@ -89,7 +89,7 @@ fn check(name: &str) {
 }
 
 #[test]
-fn a_goldfish_from_the_side() {
+fn goldfish_from_the_side() {
     check("goldfish_black_water");
 }
 
@@ -100,7 +100,7 @@ fn mice_from_above() {
 }
 
 #[test]
-fn a_finch_behind_wires() {
+fn finch_behind_wires() {
     check("zebra_finch_cage");
 }
 
@@ -111,7 +111,7 @@ fn fish_from_above() {
 }
 
 #[test]
-fn a_dog_beside_an_arm() {
+fn dog_beside_an_arm() {
     check("dog_side_with_hand");
 }
 

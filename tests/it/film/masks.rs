@@ -62,7 +62,7 @@ fn analyzed(film: &Staged, masks: &Staged, is_mixed: bool) -> Result<Library, Er
 }
 
 #[test]
-fn before_a_scene_that_moves_masks_tell_the_animal() {
+fn masks_select_the_animal_before_a_moving_scene() {
     let fish = fish();
     let film = before_running_waves(&fish);
     assert!(film.analyzed(&Params::default()).is_err(), "without masks");
@@ -115,7 +115,7 @@ fn color_error(fish: &Film, library: &Library) -> f64 {
 }
 
 #[test]
-fn the_scene_is_taken_out_of_the_rim_of_what_was_filmed() {
+fn colors_at_the_edge_are_freed_of_the_scene() {
     let fish = fish();
     let film = before_running_waves(&fish);
     let error = |is_mixed| {
@@ -130,7 +130,7 @@ fn the_scene_is_taken_out_of_the_rim_of_what_was_filmed() {
 }
 
 #[test]
-fn masks_of_another_number_or_size_or_without_an_animal_are_refused() {
+fn masks_of_another_number_or_without_an_animal_are_refused() {
     let fish = fish();
     let (film, masks_of) = (Staged::plain(), masks(&fish, false));
     let code = |masks: &Staged| {

@@ -14,7 +14,7 @@ use flockreel_core::raster::{Frame, RgbImage};
 use super::sample::filmed_without_noise;
 
 #[test]
-fn a_flock_of_one_along_its_own_path_is_the_footage() {
+fn flock_of_one_along_the_filmed_path_is_the_footage() {
     let (film, library, _) = filmed_without_noise();
     let (first, n_frames) = longest_run(library);
     assert!(n_frames > 100, "{n_frames}");

@@ -40,7 +40,7 @@ fn run(films: &Films, args: &str) {
 }
 
 #[test]
-fn every_rate_gives_a_library_and_its_poses_say_the_rate() {
+fn films_of_any_rate_are_measured_at_their_rate() {
     let films = Films::new();
     filmed(&films);
     films.run("-i film.mp4 -an -vf setpts=N/TB -r 1 -c:v libx264 lapse.mp4");
@@ -79,7 +79,7 @@ fn every_rate_gives_a_library_and_its_poses_say_the_rate() {
 }
 
 #[test]
-fn a_folder_of_pictures_is_measured_at_the_rate_that_is_said() {
+fn folder_of_pictures_is_measured_at_the_given_rate() {
     let films = Films::new();
     filmed(&films);
     std::fs::create_dir(films.path("shots")).expect("a folder");

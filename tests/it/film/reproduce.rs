@@ -9,7 +9,7 @@ use flockreel_core::raster::{Frame, RgbImage};
 use super::sample::filmed_without_noise;
 
 #[test]
-fn a_matte_over_the_plate_reproduces_its_frame() {
+fn matte_over_the_background_reproduces_its_frame() {
     let (film, library, _) = filmed_without_noise();
     let (mut stream, mut frame) = (film.open().unwrap(), Frame::default());
     let mut n_frames = 0;

@@ -81,7 +81,7 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 }
 
 #[test]
-fn the_virtual_fish_swims_where_the_filmed_one_swam() {
+fn virtual_fish_follows_the_filmed_one() {
     let (film, library, _) = filmed();
     let motion = drive(&library.poses, &Params::default()).unwrap();
     let both = motion.frames.iter().zip(&film.motion().frames);
@@ -113,7 +113,7 @@ fn the_virtual_fish_swims_where_the_filmed_one_swam() {
 }
 
 #[test]
-fn the_commands_write_a_film_of_both_fish_and_a_model() {
+fn fish_command_writes_a_film_of_both_fish_and_a_model() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name).display().to_string();
     library_on_disk(&dir.path().join("library"));
@@ -159,16 +159,20 @@ fn changed_plan_is_refused_with_its_fault() {
     assert_eq!(refused.status.code(), Some(2));
     let sentence = String::from_utf8(refused.stderr).unwrap();
     assert!(
-        sentence.contains("individual 1: cost.total or its parts are not "),
+        sentence.contains("individual 1: cost.total or its parts are not ")
+            && sentence.contains(" (wrong_cost)"),
         "{sentence}"
     );
 
     std::fs::write(&plan, "{}").unwrap();
-    assert_eq!(check().status.code(), Some(2));
+    let refused = check();
+    assert_eq!(refused.status.code(), Some(2));
+    let sentence = String::from_utf8(refused.stderr).unwrap();
+    assert!(sentence.contains("not a flock.json: "), "{sentence}");
 }
 
 #[test]
-fn the_sample_command_writes_footage_with_a_true_pose_for_every_frame() {
+fn sample_command_writes_footage_with_a_true_pose_for_every_frame() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name).display().to_string();
     let (film, truth) = (at("sample.mp4"), at("truth.json"));

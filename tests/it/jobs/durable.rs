@@ -72,7 +72,7 @@ fn assert_in_order(calls: &[String], wanted: &[Wanted]) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_answered_with_201_is_on_the_disk() {
+async fn upload_is_on_disk_before_its_201() {
     let Some(traced) = Traced::start() else {
         return;
     };
@@ -106,7 +106,7 @@ fn draft_of(rename: &str) -> String {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_a_resumable_upload_is_told_to_have_sent_is_on_the_disk() {
+async fn confirmed_bytes_of_a_resumable_upload_are_on_disk() {
     let Some(traced) = Traced::start() else {
         return;
     };

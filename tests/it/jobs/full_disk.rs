@@ -70,7 +70,7 @@ impl Drop for SmallDisk {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_full_disk_refuses_what_is_new_and_harms_nothing_that_is_there() {
+async fn full_disk_refuses_new_data_and_keeps_stored_data() {
     let place = Place::local();
     let Some(disk) = SmallDisk::over(place.data(), "64m") else {
         println!("skipped: no small disk can be mounted here, that takes root");
@@ -155,7 +155,7 @@ async fn assert_refused(server: &Server, number: usize, footage: &str) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_disk_at_zero_bytes_lets_things_be_deleted_and_needs_no_restart() {
+async fn deletion_works_with_zero_free_bytes_and_service_recovers() {
     let Some((place, disk, server)) = careless() else {
         return;
     };

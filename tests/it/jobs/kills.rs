@@ -62,7 +62,7 @@ async fn assert_swept(place: &Place) {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_job_outlives_the_server_that_ran_it_and_has_one_result() {
+async fn job_of_a_killed_server_is_finished_once() {
     let place = Place::from_environment();
     let server = Server::start_at(&place);
     let job = start_job(&server).await;
@@ -86,7 +86,7 @@ async fn a_job_outlives_the_server_that_ran_it_and_has_one_result() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_server_told_to_stop_gives_its_job_back_unused() {
+async fn stopping_server_releases_its_job_without_counting_the_attempt() {
     let place = Place::from_environment();
     let server = Server::start_at(&place);
     let job = start_job(&server).await;
@@ -95,11 +95,11 @@ async fn a_server_told_to_stop_gives_its_job_back_unused() {
     assert_eq!(server.terminate(), Some(0));
     assert!(start.elapsed() < Duration::from_secs(20));
     assert_sound(&place).await;
-    let given_back = row_of(&place, &job).await;
+    let released = row_of(&place, &job).await;
     assert_eq!(
-        given_back.state,
+        released.state,
         JobState::Queued,
-        "let go, not worked off while the service ends"
+        "the job is not finished while the service stops"
     );
 
     let server = Server::start_at(&place);
@@ -134,7 +134,7 @@ async fn result_of(server: &Server, job: &Value) -> Vec<String> {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_job_ends_once_and_as_if_nothing_had_happened_whatever_is_killed() {
+async fn jobs_end_once_with_identical_results_after_kills() {
     let place = Place::from_environment();
     let mut server = Server::start_at(&place);
     let mut jobs = Vec::new();
@@ -176,12 +176,12 @@ async fn every_job_ends_once_and_as_if_nothing_had_happened_whatever_is_killed()
 
 /// Uploads a film in two halves. The second half is sent when the returned sender is used.
 fn slow_upload(server: &Server) -> (oneshot::Sender<()>, JoinHandle<StatusCode>) {
-    let (go_on, told) = oneshot::channel::<()>();
+    let (go_on, may_go_on) = oneshot::channel::<()>();
     let film = numbered_film(1);
     let (first, second) = film.split_at(film.len() / 2);
     let (first, second) = (first.to_vec(), second.to_vec());
     let rest = async move {
-        told.await.ok();
+        may_go_on.await.ok();
         Ok(second)
     };
     let halves = once(async move { Ok::<_, std::io::Error>(first) }).chain(once(rest));
@@ -196,7 +196,7 @@ fn slow_upload(server: &Server) -> (oneshot::Sender<()>, JoinHandle<StatusCode>)
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_server_told_to_stop_refuses_what_is_new_and_ends_what_is_under_way() {
+async fn stopping_server_refuses_new_requests_and_finishes_running_ones() {
     let place = Place::from_environment();
     let server = Server::start_at(&place);
     let (go_on, upload) = slow_upload(&server);

@@ -47,7 +47,7 @@ fn poisoned_ffmpeg(folder: &Path) -> PathBuf {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn poisoned_films_fail_alone_and_the_next_twenty_jobs_finish() {
+async fn poisoned_films_fail_and_the_next_twenty_jobs_finish() {
     let place = Place::local();
     let wrapper = poisoned_ffmpeg(place.data());
     // The script starts other programs, which the sandbox would forbid.

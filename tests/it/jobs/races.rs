@@ -80,7 +80,7 @@ async fn library(store: &Store) -> Uuid {
 }
 
 #[tokio::test]
-async fn processes_that_race_for_jobs_do_each_of_them_once() {
+async fn concurrent_processes_do_each_job_once() {
     let place = Place::from_environment();
     let store = Store::open(place.storage()).await.unwrap();
     let library = library(&store).await;
@@ -127,11 +127,7 @@ async fn processes_that_race_for_jobs_do_each_of_them_once() {
 fn racer(place: &Place, library: Uuid) -> Command {
     let mut racer = Command::new(std::env::current_exe().unwrap());
     racer
-        .args([
-            "--exact",
-            "jobs::races::one_of_those_that_race",
-            "--ignored",
-        ])
+        .args(["--exact", "jobs::races::claiming_process", "--ignored"])
         .arg("--nocapture")
         .env("FLOCKREEL_RACE_FOR", library.to_string())
         .env("FLOCKREEL_RACE_PLACE", place.flags().join(" "))
@@ -140,8 +136,8 @@ fn racer(place: &Place, library: Uuid) -> Command {
 }
 
 #[tokio::test]
-#[ignore = "a process of the race above, which starts it"]
-async fn one_of_those_that_race() {
+#[ignore = "started as a process by the test above"]
+async fn claiming_process() {
     let of = |name: &str| std::env::var(name).unwrap();
     let library = of("FLOCKREEL_RACE_FOR").parse().unwrap();
     let storage = Place::storage_of(of("FLOCKREEL_RACE_PLACE").split(' '));

@@ -33,7 +33,7 @@ async fn jobs(app: &TestApp) -> Vec<(String, String, Value)> {
 }
 
 #[tokio::test]
-async fn an_empty_store_is_filled_by_three_jobs_that_everybody_can_see() {
+async fn empty_store_is_filled_by_three_visible_jobs() {
     let app = TestApp::idle().await;
     sample::fill(&app.context).await.unwrap();
     sample::fill(&app.context).await.unwrap(); // a second start while they are queued adds none
@@ -113,7 +113,7 @@ async fn a_sample_that_is_stored_already_fails_with_that_reason() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_deleted_sample_takes_its_job_and_the_jobs_after_it_along() {
+async fn deletion_of_a_sample_deletes_its_job_and_the_jobs_after_it() {
     let app = TestApp::idle().await;
     let (job, footage_id) = queued(&app).await;
     let measure = analysis::Input {

@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::jobs::{Attempt, Error, Product};
-use flockreel::store::jobs::JobState;
 use flockreel::store::jobs::cancel::Cancel;
 use flockreel::store::jobs::finish::Source;
+use flockreel::store::jobs::{Change, JobState, Lease};
 use flockreel::store::owners::OwnerFilter;
 use flockreel_core::code::Code;
 use flockreel_core::ids::JobId;
@@ -45,7 +45,7 @@ fn wait_until_cancelled(attempt: &Attempt) -> Result<Product, Error> {
 }
 
 #[tokio::test]
-async fn a_job_that_is_done_has_its_files_in_place() {
+async fn done_job_has_its_files_stored() {
     let (app, job, footage) = with_job().await;
     let worker = Worker::new(app.context.clone());
     let step = worker
@@ -58,11 +58,11 @@ async fn a_job_that_is_done_has_its_files_in_place() {
 }
 
 #[tokio::test]
-async fn a_worker_that_was_given_up_throws_its_output_away() {
+async fn worker_with_an_old_fence_discards_its_output() {
     let (app, job, footage) = with_job().await;
-    let (stale, ended) = (Worker::new(app.context.clone()), std::sync::mpsc::channel());
+    let (end_second, second_may_end) = std::sync::mpsc::channel();
+    let stale = Worker::new(app.context.clone());
     let (fresh, store) = (Worker::new(app.context.clone()), app.context.store.clone());
-    let (tell, told) = ended;
     let runtime = tokio::runtime::Handle::current();
     // During the first worker's attempt, the job is rescued and a second worker claims it. The second
     // worker finishes after the first has ended.
@@ -72,7 +72,7 @@ async fn a_worker_that_was_given_up_throws_its_output_away() {
         runtime.spawn(async move {
             let step = fresh.step_by(move |_, attempt| {
                 claimed.send(()).unwrap();
-                told.recv().unwrap();
+                second_may_end.recv().unwrap();
                 product(attempt, footage)
             });
             assert_eq!(step.await.unwrap(), Step::Done(job));
@@ -82,14 +82,14 @@ async fn a_worker_that_was_given_up_throws_its_output_away() {
     });
     assert_eq!(step.await.unwrap(), Step::Lost(job));
     assert_eq!(app.n_folders("libraries").await, 0);
-    tell.send(()).unwrap();
+    end_second.send(()).unwrap();
     assert_eq!(app.ended_job(&json!(job)).await["state"], "done");
     assert_eq!(app.n_folders("libraries").await, 1);
     app.assert_sound().await;
 }
 
 #[tokio::test]
-async fn a_running_job_lets_go_when_it_is_cancelled() {
+async fn running_job_stops_when_it_is_cancelled() {
     let (mut app, job, _) = with_job().await;
     app.context.lease = std::time::Duration::from_millis(60);
     let store = app.context.store.clone();
@@ -112,7 +112,7 @@ async fn a_running_job_lets_go_when_it_is_cancelled() {
 }
 
 #[tokio::test]
-async fn a_job_under_way_goes_back_unused_when_the_service_stops() {
+async fn running_job_is_released_when_the_service_stops() {
     let (app, job, _) = with_job().await;
     let worker = Worker::new(app.context.clone());
     let draining = app.context.draining.clone();
@@ -133,10 +133,10 @@ async fn a_job_under_way_goes_back_unused_when_the_service_stops() {
 }
 
 #[tokio::test]
-async fn a_panic_fails_its_own_job_alone() {
+async fn panic_fails_only_its_own_job() {
     let (app, job, _) = with_job().await;
     let worker = Worker::new(app.context.clone());
-    let step = worker.step_by(|_, _| panic!("as a test wants it")).await;
+    let step = worker.step_by(|_, _| panic!("panic of a test")).await;
     assert_eq!(
         step.unwrap(),
         Step::Failed(job, flockreel_core::code::Code::Internal)
@@ -154,7 +154,7 @@ fn hurried(app: &TestApp) -> Worker {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_job_that_takes_too_long_is_told_to_stop_and_fails() {
+async fn job_over_its_time_limit_is_stopped_and_fails() {
     let (app, job, _) = with_job().await;
     let step = hurried(&app)
         .step_by(|_, attempt| wait_until_cancelled(attempt))
@@ -164,7 +164,7 @@ async fn a_job_that_takes_too_long_is_told_to_stop_and_fails() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_job_that_would_fill_the_disk_is_stopped_before_it_does() {
+async fn job_is_stopped_before_it_fills_the_disk() {
     let (app, job, _) = with_job().await;
     let mut context = app.context.clone();
     context.min_free_bytes = u64::MAX;
@@ -176,7 +176,7 @@ async fn a_job_that_would_fill_the_disk_is_stopped_before_it_does() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_job_that_spins_and_does_not_listen_fails_all_the_same() {
+async fn job_that_ignores_cancellation_is_abandoned_and_fails() {
     let (app, job, footage) = with_job().await;
     let ends = Arc::new(AtomicBool::new(false));
     let end = ends.clone();
@@ -197,12 +197,15 @@ async fn a_job_that_spins_and_does_not_listen_fails_all_the_same() {
     app.assert_sound().await;
 }
 
+fn fail_transiently(_: &Lease, _: &Attempt) -> Result<Product, Error> {
+    Err(Error::Io(std::io::Error::other("transient")))
+}
+
 #[tokio::test]
-async fn what_may_pass_is_tried_again_three_times_at_most() {
+async fn transient_error_is_retried_after_a_wait() {
     let (app, job, _) = with_job().await;
     let worker = Worker::new(app.context.clone());
-    let fail = |_: &_, _: &Attempt| Err(Error::Io(std::io::Error::other("for a moment")));
-    let step = worker.step_by(fail).await.unwrap();
+    let step = worker.step_by(fail_transiently).await.unwrap();
     assert_eq!(step, Step::Retried(job));
     let row = app
         .context
@@ -213,9 +216,25 @@ async fn what_may_pass_is_tried_again_three_times_at_most() {
         .unwrap();
     assert_eq!((row.state, row.attempt), (JobState::Queued, 1));
     assert_eq!(
-        worker.step_by(fail).await.unwrap(),
+        worker.step_by(fail_transiently).await.unwrap(),
         Step::Idle,
-        "it waits its time"
+        "the wait is not over"
     );
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn transient_error_of_the_third_attempt_fails_the_job() {
+    let (app, job, _) = with_job().await;
+    let store = &app.context.store;
+    for _ in 0..2 {
+        let now_ms = app.context.now_ms().await.unwrap();
+        let lease = store.claim(uuid::Uuid::now_v7(), now_ms, 60_000).await;
+        let lease = lease.unwrap().unwrap();
+        assert_eq!(store.retry(&lease, 0).await.unwrap(), Change::Made);
+    }
+    let worker = Worker::new(app.context.clone());
+    let step = worker.step_by(fail_transiently).await.unwrap();
+    assert_eq!(step, Step::Failed(job, Code::Internal));
     app.assert_sound().await;
 }

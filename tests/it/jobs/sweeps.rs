@@ -16,7 +16,7 @@ use crate::common::TestApp;
 const HOUR: Duration = Duration::from_secs(3600);
 
 #[tokio::test]
-async fn a_running_service_removes_what_has_expired_and_nothing_else() {
+async fn running_service_removes_only_expired_data() {
     let app = TestApp::idle().await;
     let kept = app.upload(&crate::common::clip::TINY).await;
     begin_upload(&app, now_ms() - 1).await;
@@ -28,16 +28,16 @@ async fn a_running_service_removes_what_has_expired_and_nothing_else() {
     ] {
         answer_key(&app, scope, then_ms).await;
     }
-    // Folders in a bucket cannot be backdated, so strays are tested in local storage only.
-    let has_shelf = app.folder().join("blobs").exists();
-    let strays = has_shelf.then(|| [2 * HOUR, Duration::ZERO].map(|age| stray(&app, age)));
-    let [old_stray, young_stray] = strays.unwrap_or_default();
+    // Folders in a bucket cannot be backdated, so folders without a row are tested in local storage only.
+    let is_local = app.folder().join("blobs").exists();
+    let folders = is_local.then(|| [2 * HOUR, Duration::ZERO].map(|age| orphan(&app, age)));
+    let [old_folder, young_folder] = folders.unwrap_or_default();
 
     let mut context = app.context.clone();
     context.sweep_every = Duration::from_millis(20);
     let supervisor = Supervisor::start(context, 0);
     let begun = Instant::now();
-    while app.n_uploads() > 1 || old_stray.exists() {
+    while app.n_uploads() > 1 || old_folder.exists() {
         assert!(begun.elapsed() < Duration::from_secs(20), "nothing swept");
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
@@ -50,8 +50,8 @@ async fn a_running_service_removes_what_has_expired_and_nothing_else() {
     assert!(matches!(met, Begun::Run(_)), "{met:?}");
     let met = store.begin_key(&young, None, then_ms).await.unwrap();
     assert!(matches!(met, Begun::Done(_)), "{met:?}");
-    if has_shelf {
-        std::fs::remove_dir(&young_stray).unwrap();
+    if is_local {
+        std::fs::remove_dir(&young_folder).unwrap();
     }
     app.json(&format!("/v1/footage/{kept}")).await;
     app.assert_sound().await;
@@ -91,7 +91,7 @@ async fn answer_key(app: &TestApp, scope: &Scope, then_ms: i64) {
 }
 
 /// Creates a folder without a row in local storage, last modified `age` ago.
-fn stray(app: &TestApp, age: Duration) -> std::path::PathBuf {
+fn orphan(app: &TestApp, age: Duration) -> std::path::PathBuf {
     let folder = app.folder().join("blobs/footage");
     let folder = folder.join(format!("{}.0", Uuid::now_v7()));
     std::fs::create_dir_all(&folder).unwrap();

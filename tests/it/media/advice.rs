@@ -124,7 +124,7 @@ fn commands_of_advice_make_accepted_films() {
         Ok(50)
     );
     tried.push(Code::TooManyFrames);
-    the_rates_for_masks_make_them_match(&films);
+    check_rates_for_masks(&films);
     tried.push(Code::MasksDiffer);
     for &code in Code::ALL {
         let is_told = !commands(code).is_empty() || !rates(code).is_empty();
@@ -133,7 +133,7 @@ fn commands_of_advice_make_accepted_films() {
 }
 
 /// Asserts that the suggested rates make masks match a film of variable frame rate.
-fn the_rates_for_masks_make_them_match(films: &Films) {
+fn check_rates_for_masks(films: &Films) {
     let slowing = "-vf setpts=N*N*0.01/TB -fps_mode vfr -c:v mpeg4 slowing.mkv";
     let film = films.test_picture("64x48", 40, slowing);
     let masks = films.test_picture("64x48", 40, "-c:v ffv1 masks.mkv");

@@ -37,12 +37,12 @@ pub(crate) fn corpus(films: &Films) -> Vec<Case> {
     let cases = Vec::new();
     let mut corpus = Corpus { films, cases };
     corpus.cut_and_flipped();
-    corpus.of_other_kinds();
-    corpus.of_texts_and_junk();
-    corpus.of_odd_films();
-    corpus.of_odd_but_good_films();
-    corpus.of_leaping_times();
-    corpus.of_lying_headers();
+    corpus.add_other_kinds();
+    corpus.add_texts_and_junk();
+    corpus.add_odd_films();
+    corpus.add_odd_but_good_films();
+    corpus.add_leaping_times();
+    corpus.add_lying_headers();
     corpus.cases
 }
 
@@ -120,7 +120,7 @@ impl Corpus<'_> {
         }
     }
 
-    fn of_other_kinds(&mut self) {
+    fn add_other_kinds(&mut self) {
         for (args, name, code) in [
             ("-c:v mpeg2video", "bare.m2v", Code::ContainerNotAllowed),
             ("-c:v mpeg4 -f m4v", "bare.mpeg4", Code::ContainerNotAllowed),
@@ -169,7 +169,7 @@ impl Corpus<'_> {
         self.refused(cover, &[Code::NoVideoStream]);
     }
 
-    fn of_texts_and_junk(&mut self) {
+    fn add_texts_and_junk(&mut self) {
         let texts = [
             "",
             "x",
@@ -212,7 +212,7 @@ impl Corpus<'_> {
         }
     }
 
-    fn of_odd_films(&mut self) {
+    fn add_odd_films(&mut self) {
         let h264 = "-c:v libx264 -pix_fmt yuv420p";
         let key = "00112233445566778899aabbccddeeff";
         let locked = format!(
@@ -265,7 +265,7 @@ impl Corpus<'_> {
         }
     }
 
-    fn of_odd_but_good_films(&mut self) {
+    fn add_odd_but_good_films(&mut self) {
         for args in [
             "-vf setsar=2/1 -c:v mpeg4 double.mkv",
             "-vf scale=8192:16,setsar=1 -c:v ffv1 widest.mkv",
@@ -296,7 +296,7 @@ impl Corpus<'_> {
     }
 
     /// Adds small files whose time stamps imply billions of frames, or extremely high frame rates.
-    fn of_leaping_times(&mut self) {
+    fn add_leaping_times(&mut self) {
         self.film(40, "-c:v libx264 -bf 0 -pix_fmt yuv420p even.mp4");
         let micro = "time_base=1/1000000 -video_track_timescale 1000000";
         for (args, code) in [
@@ -328,7 +328,7 @@ impl Corpus<'_> {
         }
     }
 
-    fn of_lying_headers(&mut self) {
+    fn add_lying_headers(&mut self) {
         let film = std::fs::read(self.films.path("front.mp4")).unwrap();
         let at = |name: &[u8]| film.windows(4).position(|w| w == name).unwrap();
         let patched = |at: usize, bytes: &[u8]| {

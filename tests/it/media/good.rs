@@ -2,16 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use flockreel::media::{Limits, Video};
+use flockreel::media::Limits;
 use flockreel_core::footage::{FrameSource, spread_idx};
 use flockreel_core::raster::{Frame, Matrix, Range};
 
-use super::{read_all, read_whole};
+use super::{open, read_all, read_whole};
 use crate::common::film::Films;
-
-fn open(path: &std::path::Path) -> Video {
-    Video::open(path, &Limits::default()).expect("a good film")
-}
 
 #[test]
 fn accepted_codecs_give_all_frames() {

@@ -1,4 +1,4 @@
-//! Gray films of more than 8 bits: the used range is stretched to black and white, and a note reports it.
+//! Gray films of more than 8 bits: the used range is stretched to black and white, and a notice reports it.
 
 use flockreel::media::{Limits, Notice, Video};
 use flockreel_core::footage::FrameSource;

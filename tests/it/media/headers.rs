@@ -6,14 +6,10 @@ use flockreel::media::{Limits, Notice, ReadOptions, Video};
 use flockreel_core::code::Code;
 use flockreel_core::footage::FrameSource;
 
-use super::{read_all, read_whole};
+use super::{open, read_all, read_whole};
 use crate::common::film::Films;
 
 const H264: &str = "-c:v libx264 -pix_fmt yuv420p";
-
-fn open(film: &Path) -> Video {
-    Video::open(film, &Limits::default()).unwrap_or_else(|error| panic!("{film:?}: {error}"))
-}
 
 /// Returns the frame rate and the number of frames. Asserts that the frames equal those of plain ffmpeg.
 fn read(films: &Films, film: &Path) -> (f64, usize) {

@@ -23,6 +23,11 @@ use flockreel_core::code::Code;
 use flockreel_core::footage::{FrameSource, SourceError};
 use flockreel_core::raster::Frame;
 
+/// Opens a film that the default limits accept.
+fn open(film: &Path) -> Video {
+    Video::open(film, &Limits::default()).unwrap_or_else(|error| panic!("{film:?}: {error}"))
+}
+
 /// Returns all frames of a film with their times, or the code with which opening or reading is refused.
 fn read_whole(path: &Path, limits: &Limits) -> Result<Vec<(f64, Frame)>, Code> {
     let video = Video::open(path, limits).map_err(|error| error.code())?;

@@ -112,14 +112,14 @@ async fn at_work(workers: &[WorkerProcess]) -> usize {
         if let Some(busy) = busy {
             return busy;
         }
-        assert!(begun.elapsed() < Duration::from_secs(60), "nobody claims");
+        assert!(begun.elapsed() < Duration::from_secs(60), "no claim");
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
 }
 
 #[tokio::test(flavor = "multi_thread")]
 #[ignore = "needs PostgreSQL and a bucket: make scale-test"]
-async fn a_worker_killed_in_the_middle_changes_no_result() {
+async fn worker_killed_during_a_job_changes_no_result() {
     let expected = undisturbed().await;
     let place = Place::shared();
     let server = Server::start_at(&place);

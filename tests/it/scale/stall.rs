@@ -17,17 +17,17 @@ use super::machines::admitted;
 use crate::common::Place;
 use crate::common::process::WorkerProcess;
 
-async fn wait_until(what: &str, mut is_so: impl AsyncFnMut() -> bool) {
+async fn wait_until(event: &str, mut has_happened: impl AsyncFnMut() -> bool) {
     let begun = Instant::now();
-    while !is_so().await {
-        assert!(begun.elapsed() < Duration::from_secs(120), "never: {what}");
+    while !has_happened().await {
+        assert!(begun.elapsed() < Duration::from_secs(120), "never: {event}");
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
 }
 
 #[tokio::test]
 #[ignore = "needs PostgreSQL and a bucket: make scale-test"]
-async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
+async fn worker_stalled_past_its_lease_overwrites_nothing() {
     let place = Place::shared();
     let store = Store::open(place.storage()).await.unwrap();
     let context = Context::new(store.clone(), 1);
@@ -44,13 +44,14 @@ async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
         row.await.unwrap()
     };
 
-    let elsewhere = place.second_machine();
-    let stalled = WorkerProcess::start(&elsewhere);
-    wait_until("it claims", async || stalled.has_logged("job claimed")).await;
+    let machine = place.second_machine();
+    let stalled = WorkerProcess::start(&machine);
+    let claims = async || stalled.has_logged("job claimed");
+    wait_until("the worker claims the job", claims).await;
     stalled.signal(Signal::STOP);
     let fresh = WorkerProcess::start(&place.second_machine());
     let row = async || store.job(job, &OwnerFilter::All).await.unwrap().unwrap();
-    wait_until("another finishes", async || {
+    wait_until("the other worker finishes the job", async || {
         row().await.state == JobState::Done
     })
     .await;
@@ -58,14 +59,14 @@ async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
     let kept = stored().await;
 
     stalled.signal(Signal::CONT);
-    let lets_go = async || {
+    let ends = async || {
         ["job stopped", "job result discarded", "job failed"]
             .iter()
             .any(|words| stalled.has_logged(words))
     };
-    wait_until("the stalled one lets go", lets_go).await;
-    let said = stalled.log();
-    assert!(!said.contains("job done"), "{said}");
+    wait_until("the stalled worker ends the job", ends).await;
+    let log = stalled.log();
+    assert!(!log.contains("job done"), "{log}");
     assert_eq!(stalled.terminate(), Some(0));
     assert_eq!(fresh.terminate(), Some(0));
 
@@ -78,6 +79,6 @@ async fn a_worker_that_stalled_past_its_lease_overwrites_nothing() {
         2,
         "a footage and a library"
     );
-    assert_eq!(elsewhere.n_drafts(), 0);
+    assert_eq!(machine.n_drafts(), 0);
     assert_eq!(store.check(now_ms()).await.unwrap(), Vec::<String>::new());
 }

@@ -12,7 +12,7 @@ use crate::common::{Place, client};
 
 #[tokio::test]
 #[ignore = "needs PostgreSQL and a bucket: make scale-test"]
-async fn a_worker_tells_of_its_own_jobs_and_not_of_everybodys() {
+async fn worker_metrics_cover_only_its_own_jobs() {
     let place = Place::shared();
     let server = Server::start_at(&place);
     let flags = ["--metrics-bind", "127.0.0.1:0"];
@@ -22,26 +22,26 @@ async fn a_worker_tells_of_its_own_jobs_and_not_of_everybodys() {
         assert!(begun.elapsed() < Duration::from_secs(60), "never ready");
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
-    let said = worker.log();
-    let (_, at) = said.split_once("the metrics are at ").expect(&said);
+    let log = worker.log();
+    let (_, at) = log.split_once("the metrics are at ").expect(&log);
     let url = at.lines().next().unwrap();
-    let told = client().get(url).send().await.unwrap();
-    let told = told.text().await.unwrap();
+    let metrics = client().get(url).send().await.unwrap();
+    let metrics = metrics.text().await.unwrap();
     for name in ["flockreel_decoded_frames", "flockreel_build_info"] {
-        assert!(told.contains(name), "{told}");
+        assert!(metrics.contains(name), "{metrics}");
     }
     for name in ["flockreel_stored", "flockreel_queue", "flockreel_http"] {
-        assert!(!told.contains(name), "{told}");
+        assert!(!metrics.contains(name), "{metrics}");
     }
-    let elsewhere = client().get(url.replace("/metrics", "/v1/jobs"));
-    assert_eq!(elsewhere.send().await.unwrap().status(), 404);
+    let other_path = client().get(url.replace("/metrics", "/v1/jobs"));
+    assert_eq!(other_path.send().await.unwrap().status(), 404);
     assert_eq!(worker.terminate(), Some(0));
     assert_eq!(server.terminate(), Some(0));
 }
 
 #[tokio::test(flavor = "multi_thread")]
 #[ignore = "needs PostgreSQL and a bucket: make scale-test"]
-async fn a_service_whose_bucket_is_silent_says_within_seconds_that_it_is_not_ready() {
+async fn service_reports_an_unreachable_bucket_within_seconds() {
     let place = Place::shared();
     let wire = Wire::to(&std::env::var("AWS_ENDPOINT_URL").unwrap()).await;
     let flags = place.server_flags();

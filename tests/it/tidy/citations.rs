@@ -50,7 +50,7 @@ fn has_heading(document: &str, heading: &str) -> bool {
 fn cited_documents_and_headings_exist() {
     let mut faults = Vec::new();
     let folders = [
-        "src", "crates", "tests", "bench", "docs", "scripts", "static",
+        "src", "crates", "tests", "benches", "bench", "docs", "scripts", "static",
     ];
     let pages = [
         "README.md",

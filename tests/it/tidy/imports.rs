@@ -84,7 +84,7 @@ fn imports_are_found_in_paths_and_in_groups() {
 }
 
 #[test]
-fn the_import_table_says_no_where_it_should() {
+fn forbidden_imports_are_refused() {
     assert!(may_use("analysis/pose.rs", "analysis", "library"));
     assert!(!may_use("analysis/pose.rs", "analysis", "flock"));
     assert!(!may_use("raster/frame.rs", "raster", "library"));

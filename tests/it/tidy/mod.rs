@@ -18,7 +18,7 @@ use reading::{
 };
 
 #[test]
-fn a_module_imports_only_what_its_ring_may() {
+fn modules_import_only_their_ring_and_those_above() {
     let mut faults = Vec::new();
     for file in sources() {
         let name = within_package(&file);
@@ -33,7 +33,7 @@ fn a_module_imports_only_what_its_ring_may() {
 }
 
 #[test]
-fn the_outside_world_has_its_doors() {
+fn only_the_intended_modules_reach_the_outside_world() {
     let algorithms: Vec<&str> = [VALUES, MIDDLE, ALGORITHMS].concat();
     // Forbidden texts, and the modules that may not contain them. Cargo keeps axum, sqlx and tokio out of
     // the algorithms.
@@ -70,21 +70,19 @@ fn the_outside_world_has_its_doors() {
         }
         if code.contains("Command::new(") && file != "src/media/gate.rs" {
             faults.push(format!(
-                "{file}: child processes are started in media/gate.rs alone"
+                "{file}: only media/gate.rs may start child processes"
             ));
         }
         let is_folder = file.starts_with("crates/flockreel-core/src/formats/library_dir/");
         if module == "formats" && code.contains("std::fs") && !is_folder {
-            faults.push(format!(
-                "{file}: of formats, library_dir alone touches files"
-            ));
+            faults.push(format!("{file}: only library_dir may use files in formats"));
         }
     }
     assert_no(faults);
 }
 
 #[test]
-fn every_source_file_says_why_it_exists() {
+fn source_files_begin_with_their_purpose() {
     let mut faults = Vec::new();
     for file in sources() {
         let text = read(&file);
@@ -152,7 +150,7 @@ fn files_and_folders_keep_their_sizes() {
 }
 
 #[test]
-fn every_thing_is_called_by_its_one_name() {
+fn source_has_no_forbidden_names() {
     let not_a_name = [
         "utils", "util", "helpers", "helper", "common", "misc", "types", "manager",
     ];
@@ -187,7 +185,7 @@ fn every_thing_is_called_by_its_one_name() {
                 .iter()
                 .any(|part| not_a_name.iter().any(|word| part == *word))
         {
-            faults.push(format!("{file}: has not been named yet"));
+            faults.push(format!("{file}: the name says nothing about the content"));
         }
         let code = code_of(&file).to_lowercase();
         for word in elsewhere
@@ -204,7 +202,7 @@ fn every_thing_is_called_by_its_one_name() {
 }
 
 #[test]
-fn nothing_is_left_for_later_without_an_issue() {
+fn comments_about_later_work_name_an_issue() {
     let mut faults = Vec::new();
     for file in sources()
         .iter()
@@ -214,7 +212,7 @@ fn nothing_is_left_for_later_without_an_issue() {
         for (index, line) in read(file).lines().enumerate() {
             if line.contains(&["TO", "DO"].concat()) && !line.contains('#') {
                 faults.push(format!(
-                    "{file}:{}: a note for later without its issue",
+                    "{file}:{}: a comment about later work names no issue",
                     index + 1
                 ));
             }
@@ -224,7 +222,7 @@ fn nothing_is_left_for_later_without_an_issue() {
 }
 
 #[test]
-fn no_address_of_a_package_registry_is_kept() {
+fn package_registries_are_not_named() {
     let hosts: Vec<String> = [
         ["registry.npmjs", "org"],
         ["pypi", "org"],
@@ -246,7 +244,7 @@ fn no_address_of_a_package_registry_is_kept() {
 }
 
 #[test]
-fn the_page_holds_to_its_content_security_policy() {
+fn page_keeps_its_content_security_policy() {
     let mut faults = Vec::new();
     let page = read("static/index.html");
     for forbidden in [
@@ -279,7 +277,7 @@ fn the_page_holds_to_its_content_security_policy() {
 const PAGE_BYTES: usize = 90_000;
 
 #[test]
-fn the_page_stays_within_its_budget() {
+fn page_stays_within_its_budget() {
     // The pages about the API are others.
     let is_of_page = |file: &&String| !file.contains("/docs.");
     let n_bytes: usize = (files("static").iter().filter(is_of_page))
@@ -303,7 +301,7 @@ fn settings_page_names_every_setting() {
 }
 
 #[test]
-fn every_code_is_raised_somewhere() {
+fn error_codes_are_raised() {
     let sources: Vec<String> = (sources().iter())
         .filter(|file| {
             !["crates/flockreel-core/src/code.rs", "src/api/problem.rs"].contains(&file.as_str())

@@ -39,7 +39,7 @@ pub enum Error {
     /// The masks uploaded with the footage show no animal.
     #[error(
         "the masks show no animal: no mask has a white region of at least {} pixels",
-        super::subject::LEAST_AREA_PX
+        super::subject::MIN_AREA_PX
     )]
     MasksEmpty,
     /// No component is large enough in enough frames.

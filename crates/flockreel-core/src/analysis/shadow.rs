@@ -1,6 +1,6 @@
 //! Measures the shadow of an animal seen from above: darkness, blur and offset.
 //!
-//! On the floor floor_cells the animal, the background B loses the same share of light in all colors. The frame
+//! On the floor beside the animal, the background B loses the same share of light in all colors. The frame
 //! shows I = B (1 - d m), where m is the animal's alpha, shifted away from the light and blurred. Shift and
 //! blur are the pair, of a small set, that explains most of B - I over many frames. The darkness d is the
 //! least-squares solution d = sum(B m (B - I)) / sum((B m)^2). Pixels that show the animal are left out. See
@@ -223,7 +223,7 @@ impl Fit {
 }
 
 impl Cells {
-    /// Returns column and row of the cells floor_cells the animal that show its floor.
+    /// Returns column and row of the cells beside the animal that show its floor.
     ///
     /// Cells much darker than the background behind the animal are left out: a dark wall shows a mirror
     /// image.

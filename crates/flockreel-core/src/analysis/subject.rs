@@ -24,7 +24,7 @@ pub const FITS: f64 = 4.0;
 /// Number of components per sample that are tried as the subject. Free choice.
 const SEEDS_PER_SAMPLE: usize = 3;
 /// Least area of a component, pixels; smaller ones are noise. Free choice.
-pub const LEAST_AREA_PX: u64 = 12;
+pub const MIN_AREA_PX: u64 = 12;
 
 /// Cumulative histograms of R, G and B, each rising to 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -146,7 +146,7 @@ impl Look {
     }
 
     fn may_be_animal(&self) -> bool {
-        !self.is_ghost && self.area_px >= LEAST_AREA_PX as f64
+        !self.is_ghost && self.area_px >= MIN_AREA_PX as f64
     }
 
     fn diagonal_px(&self) -> f64 {

@@ -9,7 +9,8 @@ pub struct Film {
     motion: Motion,
     renderer: Renderer,
     background: RgbImage,
-    plate: Frame,
+    /// `background` in the encoder's pixel format.
+    background_frame: Frame,
 }
 
 impl Film {
@@ -22,13 +23,13 @@ impl Film {
             motion.image_size_px,
             "the background has the size of the footage"
         );
-        let mut plate = Frame::new(width, height, ColorSpec::default());
-        plate.draw_all_rgb(&background);
+        let mut background_frame = Frame::new(width, height, ColorSpec::default());
+        background_frame.draw_all_rgb(&background);
         Film {
             renderer: Renderer::new(motion.size, motion.palette),
             motion,
             background,
-            plate,
+            background_frame,
         }
     }
 
@@ -56,7 +57,7 @@ impl Film {
 
     /// Draws one whole frame into `frame`, reusing its memory. Panics beyond the last frame.
     pub fn render(&self, frame_idx: usize, frame: &mut Frame) {
-        frame.clone_from(&self.plate);
+        frame.clone_from(&self.background_frame);
         let drawing = self.draw(frame_idx);
         let mut canvas = self.background.clone();
         drawing.over(&mut canvas);

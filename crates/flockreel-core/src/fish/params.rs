@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_set_size_wins_over_the_measured_one() {
+    fn explicit_size_overrides_the_measured_one() {
         let measured = Animal {
             length_m: 0.2,
             height_m: 0.08,

@@ -322,7 +322,8 @@ fn boids_of_a_loop_do_not_overlap() {
         assert_eq!(stats.wall_violations, 0, "seed {seed}");
         stats.overlap_violations
     };
-    // Some overlaps remain that only too fast a boid could avoid. Without `avoid_encounters` there are 145 to 604.
+    // Some overlaps remain that only too fast a boid could avoid. Without `avoid_encounters` there are 145 to
+    // 604.
     let all: Vec<u64> = (1..=6).map(n_overlaps).collect();
     assert!(all.iter().sum::<u64>() < 225, "{all:?}");
 }
@@ -387,6 +388,7 @@ fn a_parameter_out_of_range_is_refused() {
         count: Some(0),
         ..Params::default()
     };
-    let error = plan_flock(&synthetic::library(View::Top), &none, &Silent).expect_err("nobody");
+    let error =
+        plan_flock(&synthetic::library(View::Top), &none, &Silent).expect_err("no individuals");
     assert_eq!(error.code(), crate::code::Code::InvalidParams);
 }

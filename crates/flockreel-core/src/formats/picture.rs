@@ -24,7 +24,7 @@ pub enum Error {
         found: (ColorType, BitDepth),
     },
     /// The picture is larger than allowed.
-    #[error("{width} x {height} pixels exceed the maximum size of a PNG")]
+    #[error("the picture is larger than allowed: {width} x {height} pixels")]
     TooLarge {
         /// Width, pixels.
         width: u32,

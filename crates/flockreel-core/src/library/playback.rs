@@ -86,3 +86,45 @@ impl Playback {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn jump(from: u32, to: u32, mirrored: bool) -> Jump {
+        Jump {
+            from,
+            to,
+            cost: 1,
+            mirrored,
+        }
+    }
+
+    /// Returns the jumps that are left of a graph of three runs.
+    fn left(mirror: bool, dwell: usize) -> Vec<(u32, u32)> {
+        let playback = Playback {
+            jumps: vec![
+                jump(1, 12, false),
+                jump(1, 20, false),
+                jump(3, 10, false),
+                jump(3, 10, true),
+                jump(12, 0, false),
+                jump(22, 3, false),
+            ],
+            component: (0..4).chain(10..13).chain(20..23).collect(),
+        };
+        let left = playback.without_dead_ends(mirror, dwell);
+        assert_eq!(left.component, playback.component);
+        left.jumps.iter().map(|jump| (jump.from, jump.to)).collect()
+    }
+
+    #[test]
+    fn jumps_to_runs_that_end_before_the_next_jump_are_dropped() {
+        let all = [(1, 12), (1, 20), (3, 10), (12, 0), (22, 3)];
+        assert_eq!(left(false, 1), all);
+        // Frames 12 and 3 end their runs. Without 22 -> 3 no jump leaves the run of 20.
+        assert_eq!(left(false, 2), [(3, 10), (12, 0)]);
+        assert_eq!(left(false, 4), []);
+        assert_eq!(left(true, 2), [(3, 10), (3, 10), (12, 0)]);
+    }
+}

@@ -6,8 +6,7 @@ use crate::cpu::Level;
 use crate::geometry::Rect;
 
 /// Blends `weight` (0..=1) of `second` with the rest of `main`, and stores the result in `main`. The box of
-/// `main` grows to contain both. `buffer` is a reused buffer. This machine must support the instructions of
-/// `cpu`.
+/// `main` grows to contain both. `buffer` is overwritten. This machine must support the instructions of `cpu`.
 pub fn cross_fade(
     main: &mut Resampled,
     second: &Resampled,
@@ -100,20 +99,10 @@ fn add_row(out: &mut [Quad], row: &[Quad], weight: i16) {
 mod tests {
     use super::*;
 
-    fn layer(rect: Rect, pixel: Quad) -> Resampled {
-        let mut layer = Resampled {
-            rect,
-            pixels: vec![pixel; rect.area() as usize],
-            runs: Vec::new(),
-        };
-        layer.show_whole();
-        layer
-    }
-
     #[test]
     fn fade_of_a_layer_into_itself_changes_nothing() {
         let rect = Rect::new(3, 2, 4, 3);
-        let mut main = layer(rect, [6400, 3201, 1603, 8192]);
+        let mut main = Resampled::uniform(rect, [6400, 3201, 1603, 8192]);
         let before = main.clone();
         cross_fade(
             &mut main,
@@ -142,7 +131,7 @@ mod tests {
             (0.0, [8192; 4]),
             (0.5, [8192, 6144, 4096, 8192]),
         ] {
-            let mut found = layer(Rect::of_size(1, 1), half);
+            let mut found = Resampled::uniform(Rect::of_size(1, 1), half);
             haze(&mut found, share, white);
             for (a, b) in found.pixels[0].iter().zip(want) {
                 assert!(a.abs_diff(b) <= 2, "{share}: {:?}", found.pixels);
@@ -153,8 +142,8 @@ mod tests {
     #[test]
     fn fade_between_separate_boxes_contains_both() {
         let at = |x| Rect::new(x, 0, 1, 1);
-        let mut main = layer(at(0), [8000, 0, 0, 16384]);
-        let second = layer(at(2), [0, 8000, 0, 16384]);
+        let mut main = Resampled::uniform(at(0), [8000, 0, 0, 16384]);
+        let second = Resampled::uniform(at(2), [0, 8000, 0, 16384]);
         cross_fade(
             &mut main,
             &second,
@@ -180,7 +169,7 @@ mod tests {
             runs: vec![[0, 1, 3]],
             ..half.clone()
         };
-        let (mut main, mut buffer) = (half, layer(rect, [9999; 4]));
+        let (mut main, mut buffer) = (half, Resampled::uniform(rect, [9999; 4]));
         cross_fade(&mut main, &other, 0.5, &mut buffer, Level::Scalar);
         assert_eq!(main.runs, [[0, 0, 3], [1, 3, 4]]);
         let shown: Vec<i16> = (main.shown().flat_map(|(_, row)| row))
@@ -193,7 +182,7 @@ mod tests {
     fn every_instruction_set_fades_to_the_same_numbers() {
         let rect = |x| Rect::new(x, 1, 41, 7);
         let drawn = |x, seed| {
-            let mut drawn = layer(rect(x), [0; 4]);
+            let mut drawn = Resampled::uniform(rect(x), [0; 4]);
             for (k, value) in (0..).zip(drawn.pixels.as_flattened_mut()) {
                 *value = (crate::random::bits(seed, &[k]) % 16385) as i16;
             }

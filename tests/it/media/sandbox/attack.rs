@@ -56,10 +56,10 @@ fn main() {
     let file = arguments.iter().rev().find_map(|a| a.strip_prefix("file:"));
     let file = file.unwrap_or_else(|| tell(Err("no file was named".into())));
     let order = if says("pipe:0") {
-read_frame()
-} else {
-fs::read(file).unwrap_or_else(|error| tell(Err(format!("no film: {error}"))))
-};
+        read_frame()
+    } else {
+        fs::read(file).unwrap_or_else(|error| tell(Err(format!("no film: {error}"))))
+    };
     let text = String::from_utf8_lossy(&order).into_owned();
     let order = text.split("ATTACK ").nth(1).unwrap_or_default();
     let mut words = order.lines().next().unwrap_or_default().split(' ');

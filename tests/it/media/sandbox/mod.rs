@@ -97,8 +97,8 @@ fn attempts(folder: &Path, tcp: &str, udp: &str) -> Vec<Attempt> {
         traced.push(vec![Privileges]);
     }
     // With CAP_SYS_RESOURCE, a process can raise its limits until the privileges are dropped.
-    let is_stopped = rustix::thread::capabilities(None).expect("Linux");
-    let may_raise = is_stopped
+    let capabilities = rustix::thread::capabilities(None).expect("Linux");
+    let may_raise = capabilities
         .effective
         .contains(rustix::thread::CapabilitySet::SYS_RESOURCE);
     raised.push(if may_raise {
@@ -188,7 +188,7 @@ fn attack_in_every_set_of_layers() {
             );
         }
         println!(
-            "{}: is_stopped by any of {:?}",
+            "{}: stopped by any of {:?}",
             attempt.name, attempt.stopped_by
         );
     }

@@ -6,7 +6,7 @@
 //! Mirror images are left out too (`ground`).
 //!
 //! Values are encoded sRGB, as in the compositor. So a matte over its background reproduces the frame, except
-//! for shadows. See docs/explanation/algorithms.md, "Mattes".
+//! for shadows and mirror images. See docs/explanation/algorithms.md, "Mattes".
 
 mod coat;
 mod given;
@@ -146,6 +146,7 @@ fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
 /// Half the width of gaps in the silhouette that count as narrow, pixels. A wire across the animal leaves
 /// one.
 const MAX_GAP_PX: u32 = 2;
+
 /// Properties of the animal near a pixel of the band.
 struct NearbyAnimal {
     /// The animal's color, levels of 255.

@@ -80,13 +80,13 @@ impl Evidence {
         // Share that a line behind an opaque animal would imitate (I = A). A line seen through the animal
         // gives less.
         let imitated_share = (self.toward as f64 / self.around.max(1) as f64).max(0.0);
-        let needs_line = self.alike > 0 && self.toward < 0;
+        let has_line = self.alike > 0 && self.toward < 0;
         let gain = (unlike - residual) / (3 * STEPS_PER_LEVEL * STEPS_PER_LEVEL) as f64;
         let is_seen = gain > criteria.gain_of_all && gain > criteria.gain * self.n_frames as f64;
         residual < criteria.unexplained * unlike
             && is_seen
             && share - imitated_share >= criteria.share
-            && (needs_line || !criteria.needs_line)
+            && (has_line || !criteria.needs_line)
     }
 }
 

@@ -171,7 +171,7 @@ mod tests {
         k / 30 % 2 == 1
     }
 
-    /// Returns the ends of an animal that moves head first at `forward(k)` body lengths per second.
+    /// Returns the evidence for an animal that moves head first at `forward(k)` body lengths per second.
     fn evidence_of(forward: impl Fn(usize) -> f64) -> HeadEvidence {
         let appearance = |k| Appearance {
             is_left: is_left(k),

@@ -1,7 +1,7 @@
 //! Decides which end is the head, in all frames together.
 //!
 //! Each frame has two states: the head at either end of the length axis. Motion toward an end and the
-//! appearance of the ends (`ends`) are evidence for a state. A turn of the head by more than a quarter circle
+//! appearance of the ends (`appearance`) are evidence for a state. A turn of the head by more than a quarter circle
 //! is expensive while the animal appears long. The Viterbi algorithm finds the cheapest sequence, the
 //! forward-backward algorithm its probability. Okabe et al., section 3.3, use only the previous frame, so
 //! that one early error lasts forever. See docs/explanation/algorithms.md, "Pose".

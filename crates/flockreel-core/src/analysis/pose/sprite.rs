@@ -23,8 +23,7 @@ const HEIGHT_SPAN_S: f64 = 0.5;
 
 /// Returns each frame's scale, relative to the frame with the animal's median height, rounded to 5 decimals.
 ///
-/// Where depths were measured, the apparent depth decides instead of the height. Frames without a value get
-/// 1.
+/// The apparent depth decides instead of the height if depths were measured. Frames without a value get 1.
 pub fn scales(poses: &Poses) -> Vec<f64> {
     let frames = &poses.frames;
     let half_span = (HEIGHT_SPAN_S * poses.fps / 2.0).round() as usize;

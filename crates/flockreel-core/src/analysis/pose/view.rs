@@ -22,10 +22,10 @@ const MAX_PROBABILITY: f64 = 0.99;
 
 /// Returns the guessed view and the probability that it is right, 0.5..=1.
 ///
-/// From the side, the animal has a back and a belly: mass and brightness differ between its upper and lower
-/// half, alike in all frames. From above, left and right are up and down in turn, so the differences change
-/// sign. The statistic is the median of each difference over its spread. Frames that are cut by the border,
-/// or show the animal steep or short, are left out.
+/// From the side, the animal has a back and a belly: its upper and lower half differ in mass and brightness,
+/// with one sign in all frames. From above, either flank can be the upper half, so the sign changes. The
+/// statistic is the median of each difference over its spread. Frames that are cut by the border, or show
+/// the animal steep or short, are left out.
 ///
 /// Returns the side view at 0.5 with too few frames.
 pub(super) fn guess(track: &[Tracked]) -> (View, f64) {

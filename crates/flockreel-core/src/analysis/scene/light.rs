@@ -182,8 +182,8 @@ fn gain(frame: &Frame, background: &Background) -> [f32; 3] {
     gains.map(|gain| gain.unwrap_or(usual))
 }
 
-/// Returns the median of the counted ratios. Returns `None` when too few pixels are bright enough or when
-/// light does not reach that ratio.
+/// Returns the median of the counted ratios. Returns `None` when too few pixels are bright enough or when the
+/// median is no gain that light can cause.
 fn median_gain(counts: &[u16; N_RATIOS]) -> Option<f32> {
     let n: u32 = counts.iter().map(|&count| u32::from(count)).sum();
     let mut below = 0;

@@ -8,7 +8,7 @@ use super::mirror::Mirror;
 use super::samples::Samples;
 use super::survey::Survey;
 use crate::analysis::params::Follow;
-use crate::analysis::subject::{FITS, LEAST_AREA_PX, Look, Subject};
+use crate::analysis::subject::{FITS, Look, MIN_AREA_PX, Subject};
 use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
 
@@ -141,7 +141,7 @@ fn second_animal(looks: &[Look], animal: usize, subject: &Subject) -> Option<usi
         let look = &looks[at];
         at != animal
             && !look.is_ghost
-            && look.area_px >= (MIN_SECOND_AREA * first.area_px).max(LEAST_AREA_PX as f64)
+            && look.area_px >= (MIN_SECOND_AREA * first.area_px).max(MIN_AREA_PX as f64)
             && subject.cost(look) < FITS
             && look.is_shadow == first.is_shadow
             && gap_px(&look.box_px, &first.box_px)

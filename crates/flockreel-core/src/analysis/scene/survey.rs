@@ -13,7 +13,7 @@ use super::light::Light;
 use super::samples::Samples;
 use super::scenery;
 use crate::analysis::silhouette::{self, shadow, tether};
-use crate::analysis::subject::{Color, LEAST_AREA_PX, Look, Subject, touches_border};
+use crate::analysis::subject::{Color, Look, MIN_AREA_PX, Subject, touches_border};
 use crate::order;
 use crate::raster::Frame;
 use crate::raster::runs::{Component, Run};
@@ -89,7 +89,7 @@ impl Survey {
         backgrounds: &[Option<&Background>],
     ) -> Survey {
         for components in &mut found {
-            components.retain(|c| c.area >= LEAST_AREA_PX);
+            components.retain(|c| c.area >= MIN_AREA_PX);
             components.sort_by_key(|c| std::cmp::Reverse(c.area));
             components.truncate(MAX_COMPONENTS);
         }
@@ -149,7 +149,7 @@ impl Survey {
         let thin_px = order::median(animals.iter().map(|c| f64::from(tether::thin_px(c))))? as u32;
         let cut = |whole: &&Component| tether::cut(whole, thin_px, picture);
         let parts: Vec<[Component; 2]> = animals.iter().filter_map(cut).collect();
-        let n_led = parts
+        let n_at_border = parts
             .iter()
             .filter(|[_, tether]| touches_border(tether.rect, picture))
             .count();
@@ -159,7 +159,11 @@ impl Survey {
             .map(|[animal, _]| animal.centroid_px())
             .collect();
         let is_anchored = spread_px(&ends) < MAX_END_SPREAD * spread_px(&places);
-        let n_tethered = if is_anchored { parts.len() } else { n_led };
+        let n_tethered = if is_anchored {
+            parts.len()
+        } else {
+            n_at_border
+        };
         (n_tethered as f64 > MIN_TETHERED_SHARE * animals.len() as f64).then_some(thin_px)
     }
 
@@ -182,10 +186,10 @@ impl Survey {
             && scenery::is_scenery(&self.components, &self.animal, &self.components[k][at])
     }
 
-    /// Returns the least area of a moving object, pixels: 0.3 of the subject's, but at least `LEAST_AREA_PX`.
+    /// Returns the least area of a moving object, pixels: 0.3 of the subject's, but at least `MIN_AREA_PX`.
     pub(super) fn least_area_px(&self) -> u64 {
         let share_of = |subject: &Subject| (0.3 * subject.area_px()) as u64;
-        self.subject.as_ref().map_or(0, share_of).max(LEAST_AREA_PX)
+        self.subject.as_ref().map_or(0, share_of).max(MIN_AREA_PX)
     }
 }
 

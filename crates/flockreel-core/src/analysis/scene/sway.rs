@@ -30,8 +30,8 @@ pub(super) fn other_color(
         .into_par_iter()
         .map(|y| {
             let counts = times_different(samples, background, y);
-            let value_indices = (0..width).filter(|&x| usize::from(counts[x]) >= MIN_SAMPLES);
-            value_indices
+            let columns = (0..width).filter(|&x| usize::from(counts[x]) >= MIN_SAMPLES);
+            columns
                 .filter_map(|x| {
                     let px = y * width + x;
                     Some((

@@ -63,7 +63,7 @@ pub fn cut(component: &Component, thin_px: u32, picture: [u32; 2]) -> Option<[Co
         mask.bits
             .iter()
             .zip(&tether_mask.bits)
-            .map(|(set, led)| set & (1 - led))
+            .map(|(set, tether)| set & (1 - tether))
             .collect(),
     );
     let animal = runs::components(&remainder)

@@ -185,7 +185,7 @@ impl GroupBuffer {
 pub(super) struct SpilledGroup {
     /// Sum of the bytes of each block, by block, then by sprite.
     sums: Vec<u32>,
-    /// Place of the blocks that are not blank in the temporary storage.
+    /// Offset of the blocks that are not blank in the temporary storage, bytes.
     offset: u64,
 }
 

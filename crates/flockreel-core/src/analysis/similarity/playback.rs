@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn of_equal_jumps_the_cheapest_is_kept() {
+    fn the_cheapest_of_equal_jumps_is_kept() {
         let found = playback(
             &[transition(3, 3, true, 9), transition(3, 3, true, 5)],
             &[true; 9],

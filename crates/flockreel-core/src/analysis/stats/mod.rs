@@ -26,7 +26,7 @@ pub(super) fn library_stats(poses: &Poses, connections: &Connections) -> Library
         n_candidates: connections.n_candidates,
         n_transitions: connections.transitions.len(),
         kappa_used: connections.kappa_used,
-        component_share: component.len() as f64 / poses.frames.len().max(1) as f64,
+        component_share: connections.component_share,
         heading_histogram: histogram(poses, component),
         speed_bl_per_s: length_px.and_then(|length| speeds(poses, length)),
         turn_rate_rad_per_s: turn_rate(poses),

@@ -8,13 +8,13 @@ use crate::raster::runs;
 
 /// Parts are thin below this share of the greatest half width. Labelled mice and flies: 0.3 to 0.6 gives the
 /// most accurate body axis. Above 0.3, a slender fish loses its own tail.
-const THIN: f64 = 0.3;
+const THIN_SHARE: f64 = 0.3;
 
 /// Returns the largest part of a silhouette without its thin parts; empty for an empty silhouette.
 pub(super) fn without_thin_parts(silhouette: &Mask) -> Mask {
     let depth = silhouette.depth_px();
     let half_width = depth.iter().copied().max().unwrap_or(0);
-    let thin = (THIN * f64::from(half_width)) as u32;
+    let thin = (THIN_SHARE * f64::from(half_width)) as u32;
     let deep = Mask {
         rect: silhouette.rect,
         bits: depth.iter().map(|&depth| u8::from(depth > thin)).collect(),

@@ -24,7 +24,7 @@ use super::params::Follow;
 use super::read_ahead::Batches;
 use super::scene::{Placed, Scene};
 use super::silhouette::{self, tether};
-use super::subject::{LEAST_AREA_PX, Look};
+use super::subject::{Look, MIN_AREA_PX};
 use super::{Error, MIN_FRAMES, Params};
 use crate::geometry::Rect;
 use crate::library::Mover;
@@ -278,7 +278,7 @@ fn described(
     let mut described: Vec<Described> = Vec::new();
     let mut movers = Vec::new();
     for component in components {
-        if component.area < LEAST_AREA_PX {
+        if component.area < MIN_AREA_PX {
             continue;
         }
         let look = measure_look(&component, frame, placed);

@@ -2,7 +2,7 @@
 //!
 //! Dynamic programming finds the cheapest path. A candidate costs half its misfit to the subject. A leap to
 //! a thing that was seen elsewhere at the same time costs much. A frame without the animal has a fixed cost.
-//! So a hand, a speck or half a silhouette is chosen only where no candidate fits better.
+//! A hand, a speck or half a silhouette is thus chosen only where no candidate fits better.
 
 use super::confidence;
 use super::sighting::Sighting;
@@ -197,7 +197,7 @@ fn judge_stretches(
     judged
 }
 
-/// The animal's movement from frame to frame. A faster one is a leap.
+/// The animal's usual movement from frame to frame; a much longer one is a leap.
 struct Motion {
     /// 90th percentile of the animal's movement from frame to frame, pixels.
     usual_px: f64,

@@ -229,11 +229,11 @@ impl FrameStream for SampleStream<'_> {
 
 fn check(params: &SampleParams) -> Result<(), Error> {
     let within = |name: &str, value: f64, lo: f64, hi: f64| {
-        let message = || format!("{name} must lie in {lo}..={hi}: {value}");
-        let is_within = (lo..=hi).contains(&value);
-        is_within
-            .then_some(())
-            .ok_or_else(|| Error::InvalidParams(message()))
+        if (lo..=hi).contains(&value) {
+            return Ok(());
+        }
+        let message = format!("{name} must lie in {lo}..={hi}: {value}");
+        Err(Error::InvalidParams(message))
     };
     within("frames", params.n_frames as f64, 1.0, 1e6)?;
     within("fps", params.fps, 1.0, 240.0)?;

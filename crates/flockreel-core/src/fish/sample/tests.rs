@@ -53,13 +53,13 @@ fn true_centroid_is_where_the_frame_differs_from_the_background() {
     for k in [0, 13, 39] {
         let mut frame = Frame::default();
         film.render(k, &mut frame);
-        let mut plate = Frame::new(320, 240, frame.color);
-        plate.draw_rgb(film.background(), Rect::of_size(320, 240));
-        let (image, plate) = (frame.to_rgb(), plate.to_rgb());
+        let mut background = Frame::new(320, 240, frame.color);
+        background.draw_all_rgb(film.background());
+        let (image, background) = (frame.to_rgb(), background.to_rgb());
         let (mut n, mut sum) = (0.0, [0.0, 0.0]);
         for y in 0..240 {
             for x in 0..320 {
-                let (a, b) = (image.pixel(x, y), plate.pixel(x, y));
+                let (a, b) = (image.pixel(x, y), background.pixel(x, y));
                 if a.iter().zip(b).any(|(p, q)| p.abs_diff(q) > 24) {
                     sum = [sum[0] + f64::from(x) + 0.5, sum[1] + f64::from(y) + 0.5];
                     n += 1.0;

@@ -39,7 +39,8 @@ pub struct Slopes {
 /// Share of frames that rise more steeply than the upward limit, and of frames that sink more steeply than
 /// the downward limit. Free choice.
 const STEEP_SHARE: f64 = 0.02;
-/// Share for slopes in the image, defined as above. For steeper boids, plans would find too few frames. Free choice.
+/// Share for slopes in the image, defined as above. For steeper boids, plans would find too few frames. Free
+/// choice.
 const STEEP_SHARE_IN_PICTURE: f64 = 0.15;
 /// Share of frames below the greatest speed, and below the greatest turn rate
 /// (docs/explanation/algorithms.md, "Boids").

@@ -67,7 +67,7 @@ const SLOPES: Slopes = Slopes {
     in_picture: [1e9; 2],
 };
 
-/// Digest of a school with goals, obstacles, a predator and positions to meet.
+/// Digest of a school with goals, obstacles, a predator and target states.
 const DIGEST_OF_ALL_FEATURES: u64 = 0xeecb_40e3_b462_3b35;
 
 fn calibration(slopes: Option<Slopes>) -> Calibration {

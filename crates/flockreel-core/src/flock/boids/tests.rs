@@ -157,7 +157,7 @@ fn slopes_in_the_image_stay_within_the_limits_where_those_in_space_allow_it() {
 }
 
 /// Returns one boid that swims at 1 BL/s and turns mostly by less than 1 rad/s.
-fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
+fn single_boid(slopes: Option<Slopes>) -> (Params, Calibration) {
     let mut params = Params {
         count: Some(1),
         leaders: false,
@@ -175,7 +175,7 @@ fn alone(slopes: Option<Slopes>) -> (Params, Calibration) {
 
 #[test]
 fn opposed_boids_form_longer_and_the_video_starts_at_the_same_time() {
-    let (mut params, calibration) = alone(None);
+    let (mut params, calibration) = single_boid(None);
     params.count = Some(2);
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [30.0, 30.0, 0.0]));
     let formed = |courses: [f64; 2]| {
@@ -227,7 +227,7 @@ fn slow_school_is_polarized_in_perspective_too() {
 
 #[test]
 fn boids_turn_at_walls_without_slowing_down() {
-    let (params, calibration) = alone(None);
+    let (params, calibration) = single_boid(None);
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [12.0, 9.0, 0.0]));
     // Head-on, and obliquely from either side.
     for y_speed in [0.0, 0.5, -0.5] {
@@ -256,7 +256,7 @@ fn boids_return_to_the_usual_slope() {
         spread: 0.05,
         in_picture: [1e9; 2],
     };
-    let (params, calibration) = alone(Some(slopes));
+    let (params, calibration) = single_boid(Some(slopes));
     let (lens, tank) = (Lens::flat(40.0), Tank::new([0.0; 3], [60.0, 60.0, 60.0]));
     for steep in [1.4, -1.4, 0.0] {
         let mut boids = Boids::new(&params, &calibration, &lens, &tank, 30.0);

@@ -22,8 +22,8 @@ const MAX_FUTURE: f64 = 134_217_728.0;
 /// Factor by which the future cost counts less per frame.
 const DISCOUNT: f64 = 0.995;
 
-/// What is compared between a boid and a state, in turns: heading, or in top view the turn, and the logarithm
-/// of the speed. With `MatchBy::Position` both components of the velocity.
+/// Quantities compared between a boid and a state, in turns: heading, or in top view the turn, and the
+/// logarithm of the speed. With `MatchBy::Position` both components of the velocity.
 pub(super) type Feature = [i64; 2];
 
 /// Costs of a flock's states and jumps.
@@ -59,13 +59,11 @@ impl<'a> Costs<'a> {
         self.states.binary_search(&(frame, side)).ok()
     }
 
-    /// Returns the playback graph.
+    /// Returns the playback graph without the jumps after which playback would end.
     pub(super) fn graph(&self, dwell: usize) -> Graph {
-        let playback = &self.library.playback;
-        let playback = playback.without_dead_ends(self.flock.params.mirror, dwell);
         let matching = &self.flock.params.matching;
         let mut jumps = Vec::new();
-        for jump in &playback.jumps {
+        for jump in &self.library.playback.jumps {
             let share = jump.cost as f64 / self.library.epsilon.max(1) as f64;
             let transition = (matching.wx * Turns::PER_RAD * share).round().min(MAX_JUMP);
             let n_again = f64::from((jump.from + 1).saturating_sub(jump.to));
@@ -83,10 +81,11 @@ impl<'a> Costs<'a> {
                 }
             }
         }
-        let next = self.states.iter();
-        let next = next
+        let states = self.states.iter();
+        let next: Vec<Option<usize>> = states
             .map(|&(frame, side)| self.state(frame + 1, side))
             .collect();
+        drop_dead_ends(&mut jumps, &next, dwell);
         Graph { next, jumps }
     }
 
@@ -195,6 +194,24 @@ impl<'a> Costs<'a> {
             }
         }
         costs
+    }
+}
+
+/// Removes the jumps after which playback would end: no jump leaves the run after the dwell.
+fn drop_dead_ends(jumps: &mut Vec<Edge>, next: &[Option<usize>], dwell: usize) {
+    loop {
+        let n_before = jumps.len();
+        let mut leaves = vec![false; next.len()];
+        for jump in jumps.iter() {
+            leaves[jump.from] = true;
+        }
+        jumps.retain(|jump| {
+            let run = successors(Some(jump.to), |&state| next[state]);
+            run.skip(dwell - 1).any(|state| leaves[state])
+        });
+        if jumps.len() == n_before {
+            return;
+        }
     }
 }
 

@@ -2,8 +2,11 @@
 //!
 //! Every step must be the next frame or a jump of the library, after the dwell. The total cost must be right,
 //! and no cheaper plan may exist. All kinds of plans are checked: whole films, segments and loops, in
-//! every view, but not with `matching.by: direction`. `costs` and `optimum` share nothing with the planner.
-//! The division of a total into its parts is not checked, only their sum.
+//! every view, but not with `matching.by: direction`. The division of a total into its parts is not checked,
+//! only their sum.
+//!
+//! `costs` and `optimum` use no code of `flock::plan`. The motion of the filmed animal and the limits of
+//! segments are not computed again: `motion`, `lens` and `follow::segments` are read here too.
 
 mod costs;
 pub(in crate::flock) mod optimum;
@@ -66,6 +69,7 @@ pub fn check(
         let checked: Vec<_> = batch.par_iter().map(|one| checker.check(one)).collect();
         n_jumps += checked.into_iter().sum::<Result<usize, Violation>>()?;
     }
+    progress.report("checking", 1.0);
     Ok(n_jumps)
 }
 

@@ -201,6 +201,13 @@ fn lower_bound_above_a_plan_is_refused() {
 }
 
 #[test]
+fn plans_matched_by_direction_are_not_checked() {
+    let (library, mut flock) = planned(View::Side, "school");
+    flock.params.matching.by = MatchBy::Direction;
+    assert_eq!(violation_of(&library, &flock).code, "not_checked");
+}
+
+#[test]
 fn files_that_do_not_belong_together_are_refused() {
     let (library, flock) = planned(View::Side, "school");
     let spoiled = |spoil: fn(&mut Flock)| {
@@ -239,9 +246,10 @@ fn loop_passes_and_wrong_continuations_are_refused() {
     let flock = plan_flock(&library, &params, &Silent).expect("a good library");
     check(&library, &flock, &Silent).expect("what the planner makes holds");
     let mut spoiled = flock.clone();
-    let heirs: Vec<Option<u32>> = flock.individuals.iter().map(|i| i.continues_as).collect();
-    spoiled.individuals[0].continues_as = heirs[1];
-    spoiled.individuals[1].continues_as = heirs[0];
+    let continuations: Vec<Option<u32>> =
+        flock.individuals.iter().map(|i| i.continues_as).collect();
+    spoiled.individuals[0].continues_as = continuations[1];
+    spoiled.individuals[1].continues_as = continuations[0];
     let code = violation_of(&library, &spoiled).code;
     assert!(
         [
@@ -253,7 +261,7 @@ fn loop_passes_and_wrong_continuations_are_refused() {
         .contains(&code),
         "{code}"
     );
-    spoiled.individuals[1].continues_as = heirs[1];
+    spoiled.individuals[1].continues_as = continuations[1];
     assert_eq!(violation_of(&library, &spoiled).code, "wrong_heir");
     spoiled.individuals[1].continues_as = None;
     assert_eq!(violation_of(&library, &spoiled).code, "wrong_heir");

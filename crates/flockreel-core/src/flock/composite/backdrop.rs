@@ -45,15 +45,15 @@ impl Backdrop {
             Background::Plate => {
                 canvas.pixels.fill(opaque([0; 3]));
                 let rect = view.rect();
-                let plate = Canvas::from_rgb(&resized(&library.background, rect.w, rect.h));
-                canvas.copy_box(&plate, rect);
+                let filmed = Canvas::from_rgb(&resized(&library.background, rect.w, rect.h));
+                canvas.copy_box(&filmed, rect);
             }
         }
-        let mut front = occluders.map(|occluders| Occluders::new(occluders, view));
-        if let Some(front) = &mut front {
-            front.remove_from(&mut canvas);
+        let mut occluders = occluders.map(|image| Occluders::new(image, view));
+        if let Some(occluders) = &mut occluders {
+            occluders.remove_from(&mut canvas);
         }
-        let mut backdrop = Backdrop::from_canvas(canvas, front, format);
+        let mut backdrop = Backdrop::from_canvas(canvas, occluders, format);
         if background == Background::Transparent {
             backdrop.is_clear = true;
             backdrop.set_transparent_color(mean_color(&library.background));
@@ -66,18 +66,18 @@ impl Backdrop {
         Backdrop::from_canvas(scaled_to_cover(picture, size_px), None, format)
     }
 
-    fn from_canvas(canvas: Canvas, front: Option<Occluders>, format: PixelFormat) -> Backdrop {
+    fn from_canvas(canvas: Canvas, occluders: Option<Occluders>, format: PixelFormat) -> Backdrop {
         let whole = Rect::of_size(canvas.width, canvas.height);
         let mut shown = canvas.clone();
-        if let Some(front) = &front {
-            front.draw(&mut shown, whole);
+        if let Some(occluders) = &occluders {
+            occluders.draw(&mut shown, whole);
         }
         let mut backdrop = Backdrop {
             is_clear: false,
             frame: Frame::default(),
             rgba: Vec::new(),
             canvas,
-            occluders: front,
+            occluders,
         };
         match format {
             PixelFormat::Planar(color) => {

@@ -61,12 +61,12 @@ impl Painter {
         nearer: Option<&Coverage>,
     ) {
         let is_morphed = appearance.fade.is_some() && context.cut == Cut::Morph;
-        let room = Viewport {
+        let viewport = Viewport {
             size: context.view.size_px,
             // Morphing needs whole sprites.
             nearer: nearer.filter(|_| !is_morphed),
         };
-        self.paint_shifted(context, appearance, room, [0.0; 2]);
+        self.paint_shifted(context, appearance, viewport, [0.0; 2]);
         if let Some(veil) = context.haze {
             let depth_px = appearance.individual.boid.position_px[appearance.frame_idx][2].max(0.0);
             haze(
@@ -128,14 +128,14 @@ impl Painter {
             reach_px(fade.source_frame[k], fade.scale[k] * context.view.scale)
         });
         let shown = appearance.individual.source_frame[appearance.frame_idx];
-        let room = reach_px(shown, place.scale).max(of_fade).ceil() as u32 + 4;
+        let margin = reach_px(shown, place.scale).max(of_fade).ceil() as u32 + 4;
         // Moves the sprite to the middle by whole pixels, so that its sub-pixel position stays the same.
-        let size = [2 * room, 2 * room];
+        let size = [2 * margin, 2 * margin];
         let shift = place
             .center_px
-            .map(|px| i64::from(room) - px.floor() as i64);
-        let room = Viewport { size, nearer: None };
-        self.paint_shifted(context, appearance, room, shift.map(|px| px as f64));
+            .map(|px| i64::from(margin) - px.floor() as i64);
+        let viewport = Viewport { size, nearer: None };
+        self.paint_shifted(context, appearance, viewport, shift.map(|px| px as f64));
         FullExtent::new(&self.layer.alpha(), self.layer.rect, shift)
     }
 
@@ -150,7 +150,7 @@ impl Painter {
         &mut self,
         context: &DrawContext,
         appearance: &Appearance,
-        room: Viewport,
+        viewport: Viewport,
         shift: [f64; 2],
     ) {
         let (individual, t) = (appearance.individual, appearance.frame_idx);
@@ -159,7 +159,7 @@ impl Painter {
         let frame = individual.source_frame[t];
         let sprite =
             (context.sprite_cache).get(context.sprites, frame, place.scale, &mut self.packed);
-        self.layer.draw(&sprite, &place, room, context.cpu);
+        self.layer.draw(&sprite, &place, viewport, context.cpu);
         let Some(fade) = appearance.fade else {
             return;
         };
@@ -170,7 +170,7 @@ impl Painter {
         let frame = fade.source_frame[k];
         let sprite =
             (context.sprite_cache).get(context.sprites, frame, place.scale, &mut self.packed);
-        self.second.draw(&sprite, &place, room, context.cpu);
+        self.second.draw(&sprite, &place, viewport, context.cpu);
         if context.cut == Cut::Morph {
             warp_together(&mut self.layer, &mut self.second, fade.weight[k]);
         }

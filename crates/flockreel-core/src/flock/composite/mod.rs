@@ -70,9 +70,9 @@ pub enum PixelFormat {
 /// One drawn frame of the film.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shot {
-    /// Planes; empty with `Form::Straight`.
+    /// Planes; empty with `PixelFormat::Straight`.
     pub frame: Frame,
-    /// Straight-alpha RGBA by rows; empty with `Form::Planar`.
+    /// Straight-alpha RGBA by rows; empty with `PixelFormat::Planar`.
     pub rgba: Vec<u8>,
     /// Ground truth of the frame, if the compositor computes it (`Compositor::with_truth`).
     pub truth: FrameTruth,
@@ -196,8 +196,8 @@ impl<'a> Compositor<'a> {
     /// Returns the occluders in front of the animals. `None` if there are none, or if the shot has its own
     /// background.
     fn occluders(&self, shot: &Shot) -> Option<&Occluders> {
-        let front = self.backdrop.occluders.as_ref();
-        front.filter(|_| shot.behind.planes.is_empty())
+        let occluders = self.backdrop.occluders.as_ref();
+        occluders.filter(|_| shot.behind.planes.is_empty())
     }
 
     /// Returns the share of each pixel that the occluders leave to the animals, in 16384ths.

@@ -37,8 +37,8 @@ impl Occluders {
     /// Replaces a background of the film's size by the scene behind the occluders, S = (B - w F) / (1 - w).
     /// Drawing the occluders over S gives B again at any size: colors of occluders that resizing made too
     /// bright or too dark for B are clamped.
-    pub(super) fn remove_from(&mut self, plate: &mut Canvas) {
-        for (behind, front) in plate.pixels.iter_mut().zip(&mut self.canvas.pixels) {
+    pub(super) fn remove_from(&mut self, background: &mut Canvas) {
+        for (behind, front) in background.pixels.iter_mut().zip(&mut self.canvas.pixels) {
             let through = i32::from(ONE as i16 - front[3]);
             if front[3] == 0 {
                 continue;
@@ -86,8 +86,8 @@ mod tests {
 
     #[test]
     fn occluders_over_the_scene_behind_them_give_the_background() {
-        let (mut plate, mut occluders) = (RgbImage::new(16, 16), RgbaImage::new(16, 16));
-        let pixels = plate.pixels.chunks_exact_mut(3);
+        let (mut background, mut occluders) = (RgbImage::new(16, 16), RgbaImage::new(16, 16));
+        let pixels = background.pixels.chunks_exact_mut(3);
         let both = pixels.zip(occluders.pixels.chunks_exact_mut(4));
         for (k, (shown, front)) in both.enumerate() {
             let alpha = [0, 60, 128, 254, 255][k % 5];
@@ -100,7 +100,7 @@ mod tests {
         }
         for side in [16, 8, 11, 24, 33] {
             let view = View::fitted([16, 16], [side, side]);
-            let wanted = Canvas::from_rgb(&resized(&plate, side, side));
+            let wanted = Canvas::from_rgb(&resized(&background, side, side));
             let (mut front, mut shown) = (Occluders::new(&occluders, &view), wanted.clone());
             front.remove_from(&mut shown);
             front.draw(&mut shown, Rect::of_size(side, side));

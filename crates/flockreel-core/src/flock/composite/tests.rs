@@ -84,16 +84,16 @@ fn pixels_without_animals_equal_the_background() {
     let (mut shot, mut empty) = (Shot::default(), Shot::default());
     film.render(17, &mut shot);
     film.backdrop.reset(&mut empty);
-    let (frame, plate) = (shot.frame, empty.frame);
+    let (frame, background) = (shot.frame, empty.frame);
     let half = f64::from(library.sprites.width()) / 2.0 * std::f64::consts::SQRT_2 + 3.0;
     let width = frame.width as usize;
-    for (k, (drawn, plate)) in frame.luma().iter().zip(plate.luma()).enumerate() {
+    for (k, (drawn, behind)) in frame.luma().iter().zip(background.luma()).enumerate() {
         let (x, y) = ((k % width) as f64, (k / width) as f64);
         let near = flock.individuals.iter().any(|individual| {
             let [cx, cy] = individual.centroid_px[17];
             (x - cx).hypot(y - cy) < half
         });
-        assert!(near || drawn == plate, "{x} {y}");
+        assert!(near || drawn == behind, "{x} {y}");
     }
 }
 
@@ -220,7 +220,7 @@ fn ground_truth_positions_equal_those_of_the_flock() {
                 assert_eq!(seen.centroid_px, individual.centroid_px[t]);
                 let [x, y, w, h] = seen
                     .amodal_box
-                    .expect("everybody is drawn")
+                    .expect("all individuals are drawn")
                     .map(|v| v as f64);
                 let [cx, cy] = seen.centroid_px;
                 assert!((x..x + w).contains(&cx) && (y..y + h).contains(&cy));
@@ -320,9 +320,9 @@ fn transparent_film_over_the_background_equals_the_film() {
     for (k, rgba) in clear.rgba.chunks_exact(4).enumerate() {
         n_clear += usize::from(rgba[3] == 0);
         for channel in 0..3 {
-            let plate = u32::from(library.background.pixels[3 * k + channel]);
+            let behind = u32::from(library.background.pixels[3 * k + channel]);
             let alpha = u32::from(rgba[3]);
-            let shown = (u32::from(rgba[channel]) * alpha + plate * (255 - alpha)) / 255;
+            let shown = (u32::from(rgba[channel]) * alpha + behind * (255 - alpha)) / 255;
             error += u64::from((shown as u8).abs_diff(film.pixels[3 * k + channel]));
         }
     }

@@ -244,8 +244,8 @@ mod tests {
             for t in (1..120).filter(|t| ![30, 31, 90, 91].contains(t)) {
                 for id in 0..2 {
                     let step = minus(film[t].positions[id], film[t - 1].positions[id]);
-                    let r = scaled(1.0 / FPS, film[t].velocities[id]);
-                    assert!(norm(minus(step, r)) < 0.006, "{t} {step:?} {r:?}");
+                    let wanted = scaled(1.0 / FPS, film[t].velocities[id]);
+                    assert!(norm(minus(step, wanted)) < 0.006, "{t} {step:?} {wanted:?}");
                 }
             }
         }

@@ -33,8 +33,8 @@ pub(super) fn n_meeting_frames(n_frames: u32, fps: f64) -> usize {
     ((MEETING_S * fps).round() as usize).min(4 * n_frames as usize / 5)
 }
 
-/// Returns the continuation of each individual, a permutation of the ids. `end` holds the boids when steering begins,
-/// `lead` the moments before the first frame.
+/// Returns the continuation of each individual, a permutation of the ids. `end` holds the boids when
+/// steering begins, `lead` the moments before the first frame.
 pub(super) fn continuations(end: &Snapshot, lead: &[Snapshot]) -> Vec<u32> {
     let Some(first) = lead.first() else {
         return (0..end.positions.len() as u32).collect();
@@ -200,8 +200,8 @@ mod tests {
         for t in 1..90 {
             let step = 30.0 * (x(t) - x(t - 1));
             assert!((0.2..1.1).contains(&step), "{t}: {step}");
-            let r = film[t].velocities[0][0];
-            assert!((r - step).abs() < 0.1, "{t}: {r} {step}");
+            let velocity = film[t].velocities[0][0];
+            assert!((velocity - step).abs() < 0.1, "{t}: {velocity} {step}");
         }
     }
 }

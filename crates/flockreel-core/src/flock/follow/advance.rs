@@ -29,6 +29,7 @@ const PURSUIT_PER_BL: f64 = 1.0;
 const AVOIDANCE_WEIGHT: f64 = 2.0;
 /// Top view: time constant with which headings follow the wanted course, seconds. Free choice.
 const TURN_S: f64 = 0.25;
+
 /// Headings, radians, and positions, pixels, of an individual by frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Trajectory {
@@ -137,8 +138,8 @@ impl Placer<'_> {
         trajectories
     }
 
-    /// Begins each trajectory at the position of its boid, or at a resting place if the animal starts at rest.
-    /// Returns the first frames, by id.
+    /// Begins each trajectory at the position of its boid, or at a resting place if the animal starts at
+    /// rest. Returns the first frames, by id.
     fn first_frames(
         &self,
         shown: &[Vec<(u32, bool)>],

@@ -81,8 +81,8 @@ pub(super) fn play(
         let mut course = Course::new(&boids, placer.lens);
         for t in first..end {
             step()?;
-            let gait = |states: &Vec<u32>| follower.natural.gait(states[t - first]);
-            boids.impose_motion(states.iter().map(gait).collect());
+            let motion = |states: &Vec<u32>| follower.natural.motion(states[t - first]);
+            boids.impose_motion(states.iter().map(motion).collect());
             if t > 0 {
                 boids.advance();
             }

@@ -29,7 +29,7 @@ pub(super) struct NaturalPlayback<'a> {
     /// Target state and cost, turns, of each jump, by source state.
     jumps: Vec<Vec<(u32, u32)>>,
     /// Speed and turn rate, by state.
-    gaits: Vec<ImposedMotion>,
+    motions: Vec<ImposedMotion>,
 }
 
 impl<'a> NaturalPlayback<'a> {
@@ -41,7 +41,7 @@ impl<'a> NaturalPlayback<'a> {
                 jumps[source as usize].push((target, cost));
             }
         }
-        let gait = |state| {
+        let motion_in = |state| {
             let Some((frame, mirrored)) = trellis.shown(state) else {
                 return ImposedMotion::default();
             };
@@ -56,7 +56,7 @@ impl<'a> NaturalPlayback<'a> {
             model,
             seed,
             jumps,
-            gaits: (0..trellis.n_states()).map(gait).collect(),
+            motions: (0..trellis.n_states()).map(motion_in).collect(),
         }
     }
 
@@ -74,8 +74,8 @@ impl<'a> NaturalPlayback<'a> {
         drawn.min_by_key(|&state| cost(state as usize))
     }
 
-    /// Returns the states of the `n` frames after `state`. No jump is made in the first `n_forced` frames, unless
-    /// the run ends.
+    /// Returns the states of the `n` frames after `state`. No jump is made in the first `n_forced` frames,
+    /// unless the run ends.
     pub(super) fn states(
         &self,
         mut state: u32,
@@ -117,7 +117,7 @@ impl<'a> NaturalPlayback<'a> {
     }
 
     /// Returns speed and turn rate of the animal in a state.
-    pub(super) fn gait(&self, state: u32) -> ImposedMotion {
-        self.gaits[state as usize]
+    pub(super) fn motion(&self, state: u32) -> ImposedMotion {
+        self.motions[state as usize]
     }
 }

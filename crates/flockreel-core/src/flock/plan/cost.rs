@@ -133,7 +133,7 @@ impl Weights {
         }
     }
 
-    /// Returns `of_state` for matching that does not compare directions in depth.
+    /// Returns `parts_of` for matching that does not compare directions in depth.
     #[inline(always)]
     fn of_gaps(&self, turns: [u16; 2], log_speeds: [u16; 2]) -> [u32; 2] {
         let [beyond, within] = self.parts(turns[0], turns[1]);
@@ -179,7 +179,7 @@ impl Weights {
         (squared.sqrt() * (Turns::PER_RAD / UNIT) as f32 + 0.5) as u32
     }
 
-    /// Returns the sum of `of_state`, limited to values below `CEILING`.
+    /// Returns the sum of `parts_of`, limited to values below `CEILING`.
     #[inline(always)]
     pub fn total(&self, wanted: Feature, state: Feature) -> u32 {
         let [heading, speed] = self.parts_of(wanted, state);

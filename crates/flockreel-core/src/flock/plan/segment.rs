@@ -42,7 +42,7 @@ impl PlaybackStatus {
 
 /// Returns the future cost of each state, in turns: the cost of the jumps that endless playback cannot
 /// avoid, discounted by when they come. `FORBIDDEN` if playback cannot continue from a state.
-pub(in crate::flock) fn future_costs(trellis: &Trellis, dwell: usize) -> Vec<u32> {
+pub(super) fn future_costs(trellis: &Trellis, dwell: usize) -> Vec<u32> {
     let after_dwell = (0..dwell).fold(1.0, |share, _| share * DISCOUNT);
     let mut future = vec![0.0f64; trellis.n_states()];
     for _ in 0..MAX_ITERATIONS {

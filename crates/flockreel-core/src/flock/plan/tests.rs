@@ -4,19 +4,18 @@ use super::*;
 use crate::flock::check::check;
 use crate::flock::lens::Lens;
 use crate::flock::motion::motion_of;
-use crate::flock::params::{MatchBy, Position};
+use crate::flock::params::{MatchBy, Matching, Position};
 use crate::flock::synthetic;
-use crate::flock::{Flock, plan_flock};
+use crate::flock::{Flock, PlanCost, plan_flock};
 use crate::geometry::Turns;
 use crate::library::View;
 use crate::parameters::Parameters;
 use crate::progress::Silent;
 
-/// Returns a flock of the named preset. `direction` and `position` are a school matched by that criterion.
+/// Returns a flock of the named preset. `position` is a school matched by position.
 fn flock(view: View, name: &str) -> (Library, Flock) {
     let library = synthetic::library(view);
     let (preset, by) = match name {
-        "direction" => ("school", MatchBy::Direction),
         "position" => ("school", MatchBy::Position),
         name => (name, MatchBy::Heading),
     };
@@ -49,6 +48,33 @@ fn plans_read_from_their_file_pass_the_check() {
             assert!((parts - cost.total).abs() < 1e-5);
             assert!(cost.lower_bound <= cost.total);
         }
+    }
+}
+
+#[test]
+fn part_of_the_cost_without_its_weight_is_zero() {
+    type Disable = fn(&mut Matching);
+    type Part = fn(&PlanCost) -> f64;
+    let library = synthetic::library(View::Side);
+    let parts: [(Disable, Part); 5] = [
+        (|m| (m.w_h, m.w_r) = (0.0, 0.0), |cost| cost.heading),
+        (|m| m.w_v = 0.0, |cost| cost.speed),
+        (|m| m.wx = 0.0, |cost| cost.transition),
+        (|m| m.w_c = 0.0, |cost| cost.crowd),
+        (|m| m.w_p = 0.0, |cost| cost.repetition),
+    ];
+    for (idx, (disable, part)) in parts.into_iter().enumerate() {
+        let mut params = Params {
+            count: Some(4),
+            frames: 60,
+            ..Params::default()
+        };
+        disable(&mut params.matching);
+        let flock = plan_flock(&library, &params, &Silent).expect("a good library");
+        let costs = flock.individuals.iter().map(|one| part(&one.cost));
+        assert_eq!(costs.sum::<f64>(), 0.0, "part {idx}");
+        let totals = flock.individuals.iter().map(|one| one.cost.total);
+        assert!(totals.sum::<f64>() > 0.0, "part {idx}");
     }
 }
 

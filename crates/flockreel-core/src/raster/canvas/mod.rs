@@ -270,16 +270,6 @@ mod tests {
     use crate::raster::{ColorSpec, Frame};
     use proptest::prelude::*;
 
-    fn layer(rect: Rect, pixel: Quad) -> Resampled {
-        let mut layer = Resampled {
-            rect,
-            pixels: vec![pixel; rect.area() as usize],
-            runs: Vec::new(),
-        };
-        layer.show_whole();
-        layer
-    }
-
     #[test]
     fn opaque_hides_half_mixes_and_transparent_shows() {
         let rect = Rect::of_size(1, 1);
@@ -292,13 +282,14 @@ mod tests {
             for cpu in Level::available() {
                 let mut canvas = Canvas::new(1, 1);
                 let mut coverage = Coverage::new([1, 1]);
-                canvas.draw_layer_under(&layer(rect, pixel), &mut coverage, cpu);
+                canvas.draw_layer_under(&Resampled::uniform(rect, pixel), &mut coverage, cpu);
                 let mut shown = canvas.clone();
                 let mut behind = Canvas::new(1, 1);
                 behind.pixels[0] = opaque([100; 3]);
                 shown.draw_box_under(&behind, rect, cpu);
                 assert_eq!(straight(shown.pixels[0]), want, "{}", cpu.name());
-                canvas.draw_layer_under(&layer(rect, opaque([100; 3])), &mut coverage, cpu);
+                let gray = Resampled::uniform(rect, opaque([100; 3]));
+                canvas.draw_layer_under(&gray, &mut coverage, cpu);
                 assert_eq!(straight(canvas.pixels[0]), want, "{}", cpu.name());
             }
         }
@@ -308,7 +299,7 @@ mod tests {
     fn sprite_on_an_empty_canvas_keeps_alpha_and_color() {
         let mut canvas = Canvas::new(2, 1);
         let [r, g, b, a] = opaque([200, 100, 40]);
-        let quarter = layer(Rect::of_size(1, 1), [r / 4, g / 4, b / 4, a / 4]);
+        let quarter = Resampled::uniform(Rect::of_size(1, 1), [r / 4, g / 4, b / 4, a / 4]);
         canvas.draw_layer_under(&quarter, &mut Coverage::new([2, 1]), Level::detect());
         let mut rgba = vec![9; 8];
         canvas.write_straight(Rect::of_size(2, 1), &mut rgba);
@@ -360,7 +351,7 @@ mod tests {
         for (seed, width, height) in [(1, 37, 21), (2, 64, 16), (3, 5, 7), (4, 23, 2)] {
             let base = random_canvas(seed, width, height);
             let rect = Rect::clipped(1, 1, i64::from(width) - 1, i64::from(height), width, height);
-            let mut sprite = layer(rect, [0; 4]);
+            let mut sprite = Resampled::uniform(rect, [0; 4]);
             let other = random_canvas(seed + 9, rect.w, rect.h);
             sprite.pixels = other.pixels;
             let with = |cpu: Level| {

@@ -73,10 +73,10 @@ pub(in crate::raster) fn scaled(value: i16, weight: i16) -> i16 {
 
 const fn all_weights() -> [[i16; 4]; N_PHASES] {
     let mut all = [[0; 4]; N_PHASES];
-    let mut place = 0;
-    while place < N_PHASES {
-        all[place] = weights(place as i64);
-        place += 1;
+    let mut phase = 0;
+    while phase < N_PHASES {
+        all[phase] = weights(phase as i64);
+        phase += 1;
     }
     all
 }
@@ -108,14 +108,14 @@ const fn weights(f: i64) -> [i16; 4] {
 const fn wide_weights() -> [[i16; 16]; N_PHASES] {
     let narrow = all_weights();
     let mut wide = [[0; 16]; N_PHASES];
-    let mut place = 0;
-    while place < N_PHASES {
+    let mut phase = 0;
+    while phase < N_PHASES {
         let mut k = 0;
         while k < 16 {
-            wide[place][k] = narrow[place][k / 4];
+            wide[phase][k] = narrow[phase][k / 4];
             k += 1;
         }
-        place += 1;
+        phase += 1;
     }
     wide
 }
@@ -124,15 +124,15 @@ const fn wide_weights() -> [[i16; 16]; N_PHASES] {
 const fn paired_weights() -> [[i32; 4]; N_PHASES] {
     let narrow = all_weights();
     let mut twice = [[0; 4]; N_PHASES];
-    let mut place = 0;
-    while place < N_PHASES {
+    let mut phase = 0;
+    while phase < N_PHASES {
         let mut tap = 0;
         while tap < 4 {
-            let weight = narrow[place][tap];
-            twice[place][tap] = (weight as i32) << 16 | (weight as u16 as i32);
+            let weight = narrow[phase][tap];
+            twice[phase][tap] = (weight as i32) << 16 | (weight as u16 as i32);
             tap += 1;
         }
-        place += 1;
+        phase += 1;
     }
     twice
 }
@@ -147,19 +147,19 @@ mod tests {
         // Half way: -1, 9, 9, -1 sixteenths.
         let sixteenths = WEIGHTS[128].map(|w| (f64::from(w) / 2048.0).round());
         assert_eq!(sixteenths, [-1.0, 9.0, 9.0, -1.0]);
-        for (place, weights) in WEIGHTS.iter().enumerate() {
-            let f = place as f64 / 256.0;
+        for (phase, weights) in WEIGHTS.iter().enumerate() {
+            let f = phase as f64 / 256.0;
             let exact = 1.0 - 2.5 * f * f + 1.5 * f * f * f;
             assert!(
                 (f64::from(weights[1]) / 32767.0 - exact).abs() < 1e-4,
-                "{place}"
+                "{phase}"
             );
             assert_eq!(weights.iter().map(|&w| i32::from(w)).sum::<i32>(), 32767);
         }
     }
 
     #[test]
-    fn a_weight_of_one_changes_nothing() {
+    fn weight_of_one_changes_nothing() {
         assert!((0..=ONE).all(|value| scaled(value, 32767) == value));
     }
 }

@@ -124,6 +124,18 @@ impl Resampled {
         }
         alpha
     }
+
+    /// Returns a layer of one color, visible in its whole box.
+    #[cfg(test)]
+    pub(super) fn uniform(rect: Rect, pixel: Quad) -> Resampled {
+        let mut layer = Resampled {
+            rect,
+            pixels: vec![pixel; rect.area() as usize],
+            runs: Vec::new(),
+        };
+        layer.show_whole();
+        layer
+    }
 }
 
 /// The target on which rows of a placed sprite are drawn.

@@ -28,7 +28,7 @@ fn image_in_a_dark_wall_and_shadow_before_it_are_left_out() {
     }
 }
 
-/// That scene, and an image farther along the wall, as dark as the body.
+/// A body half in front of the wall, and an image farther along the wall, as dark as the body.
 fn with_image_across_the_wall(x: u32, y: u32) -> u8 {
     let is_image = (92..102).contains(&x) && (29..36).contains(&y);
     if is_image { FUR } else { across_the_wall(x, y) }
@@ -47,13 +47,13 @@ fn image_too_large_for_a_limb_is_left_out() {
 ///
 /// The image is as dark as the body in its middle and fades over ten pixels.
 fn with_a_small_image(x: u32, y: u32) -> u8 {
-    let midst = Rect {
+    let middle = Rect {
         x: 75,
         y: 31,
         w: 3,
         h: 3,
     };
-    let faded = steps_away([x, y], midst).min(10) as u8;
+    let faded = steps_away([x, y], middle).min(10) as u8;
     match steps_away([x.saturating_sub(10), y], BODY) {
         0 => FUR,
         _ if wall(x, y) == WALL => FUR + (WALL - FUR) / 10 * faded,
@@ -110,7 +110,7 @@ fn limb_apart_from_the_body_is_kept() {
     }
 }
 
-/// That body, half of it in front of the wall.
+/// A dark body, half of it in front of the wall.
 fn across_the_wall(x: u32, y: u32) -> u8 {
     match steps_away([x.saturating_sub(25), y], BODY) {
         0 => FUR,

@@ -146,12 +146,12 @@ fn likelihoods(costs: &[Vec<f64>]) -> Vec<Vec<f64>> {
 }
 
 /// Returns the forward probabilities of every cell in the frames of a block.
-fn forward(entry_messages: &[f64], likelihoods: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn forward(entry_message: &[f64], likelihoods: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut forward: Vec<Vec<f64>> = Vec::with_capacity(likelihoods.len());
     for likelihood in likelihoods {
         let mut probability = forward
             .last()
-            .map_or(entry_messages.to_vec(), |last| propagated(last));
+            .map_or(entry_message.to_vec(), |last| propagated(last));
         probability
             .iter_mut()
             .zip(likelihood)

@@ -11,7 +11,7 @@ const BRIDGE_S: f64 = 0.5;
 /// Smallest number of uncut silhouettes. One second of them is needed too. Free choice.
 const MIN_SILHOUETTES: usize = 8;
 
-/// Second moments xx, xy and yy of a pixel, a square, square pixels.
+/// Second moments xx, xy and yy of one pixel, which is a square, in square pixels.
 pub(super) const PIXEL_MOMENTS_PX2: [f64; 3] = [1.0 / 12.0, 0.0, 1.0 / 12.0];
 
 /// The observations of a footage.

@@ -150,8 +150,9 @@ impl Shape {
         let frames = || fitted_frames(observations, states);
         let spread = |residual: Option<f64>| NOISE_FROM_RESIDUAL * 1.4826 * residual.unwrap_or(0.0);
         let vertical = median(frames().map(|frame| {
-            let expected_m = observations.focal_px * self.vertical_extent(frame.state.pitch).m;
-            (libm::log(expected_m / frame.silhouette.vertical_px) - frame.state.log_z).abs()
+            let extent_m = self.vertical_extent(frame.state.pitch).m;
+            let depth_m = observations.focal_px * extent_m / frame.silhouette.vertical_px;
+            (libm::log(depth_m) - frame.state.log_z).abs()
         }));
         let moments = median(frames().flat_map(|frame| {
             let expected = self.moments_px2(observations, &frame);

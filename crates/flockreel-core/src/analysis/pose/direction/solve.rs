@@ -14,7 +14,7 @@ const MAX_REMAINING_GAIN: f64 = 2.0;
 /// most three frames.
 const N_FIXED: usize = 3;
 
-/// When a descent ends.
+/// Limits at which a descent ends.
 struct Limits {
     max_steps: usize,
     /// The descent stops when it is unlikely to fall below this energy.

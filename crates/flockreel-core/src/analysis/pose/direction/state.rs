@@ -2,7 +2,7 @@
 
 /// Number of unknowns per frame.
 pub(super) const N_STATE: usize = 5;
-/// Places of the unknowns of a frame.
+/// Indices of the unknowns among those of a frame.
 pub(super) const LOG_Z: usize = 0;
 pub(super) const YAW: usize = 1;
 pub(super) const PITCH: usize = 2;

@@ -31,21 +31,22 @@ pub(super) fn opposite_end(outline: &[[f64; 2]], end: usize) -> usize {
     curvature_center(&excess_curvature(outline), (end + N_POINTS / 2) % N_POINTS)
 }
 
+/// Returns the curvature at each point minus its mean, 1/pixels.
 fn excess_curvature(outline: &[[f64; 2]]) -> Vec<f64> {
     let curvature = curvature(outline);
     let mean = curvature.iter().sum::<f64>() / N_POINTS as f64;
     curvature.iter().map(|c| c - mean).collect()
 }
 
-/// Returns the center of the above-mean curvature near an index, by four iterations of the weighted mean.
-fn curvature_center(above: &[f64], start: usize) -> usize {
+/// Returns the center of the excess curvature near an index, by four iterations of the weighted mean.
+fn curvature_center(excess: &[f64], start: usize) -> usize {
     const NEAR: i64 = N_POINTS as i64 / 6;
     let at = |offset: i64| (start as i64 + offset).rem_euclid(N_POINTS as i64) as usize;
     let mut shift = 0;
     for _ in 0..4 {
         let (mut sum, mut total) = (0.0, 0.0);
         for offset in shift - NEAR..=shift + NEAR {
-            let weight = above[at(offset)].max(0.0);
+            let weight = excess[at(offset)].max(0.0);
             sum += weight * offset as f64;
             total += weight;
         }
@@ -58,8 +59,8 @@ fn curvature_center(above: &[f64], start: usize) -> usize {
 
 /// Returns the curvature at each point of a clockwise outline, 1/pixels, positive where it is convex.
 ///
-/// The curvature is four times the area of the triangle with the two points at distance `NEIGHBOR_DISTANCE`, divided by
-/// the product of its sides.
+/// The curvature is four times the area of the triangle with the two points at distance `NEIGHBOR_DISTANCE`,
+/// divided by the product of its sides.
 fn curvature(outline: &[[f64; 2]]) -> Vec<f64> {
     (0..N_POINTS)
         .map(|k| {
@@ -128,12 +129,12 @@ mod tests {
 
     #[test]
     fn the_end_of_a_head_with_two_eyes_is_between_them() {
-        let mut above = vec![-1.0; N_POINTS];
+        let mut excess = vec![-1.0; N_POINTS];
         for eye in [58, 72] {
-            above[eye - 2..=eye + 2].fill(5.0);
+            excess[eye - 2..=eye + 2].fill(5.0);
         }
-        assert_eq!(curvature_center(&above, 64), 65);
-        assert_eq!(curvature_center(&above, 70), 65);
+        assert_eq!(curvature_center(&excess, 64), 65);
+        assert_eq!(curvature_center(&excess, 70), 65);
     }
 
     #[test]

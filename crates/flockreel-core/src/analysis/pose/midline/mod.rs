@@ -2,8 +2,8 @@
 //!
 //! The method walks both sides of the outline from head to tail and pairs opposite points (after Walter &
 //! Couzin, TRex, eLife 2021). If that fails, the means of cross-sections replace it. In side view the body
-//! bends along the line of sight, where the outline does not show it. There only an animal much longer than
-//! high gets a midline.
+//! bends along the line of sight, where the outline does not show it. Only an animal much longer than high
+//! gets a midline in side view.
 
 pub mod tail_beat;
 

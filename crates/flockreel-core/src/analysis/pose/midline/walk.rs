@@ -3,7 +3,7 @@
 
 use super::distance;
 
-/// How far one side may run ahead to find a nearer partner, as a share of the outline.
+/// Largest lead of one side in search of a nearer partner, as a share of the outline.
 const MAX_LEAD: f64 = 0.025;
 
 /// Returns the midline from `head` to `tail`, two indices of a closed outline. The points are unevenly

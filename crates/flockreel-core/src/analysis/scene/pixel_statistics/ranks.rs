@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_stays_as_it_is_is_the_commonest_though_something_passes_more_often() {
+    fn commonest_value_is_found_in_a_third_of_the_samples() {
         // Among 60 free samples, 20 show the scene, and no ten of the other 40 are alike. Four samples are not
         // free.
         let value = |k: usize| {

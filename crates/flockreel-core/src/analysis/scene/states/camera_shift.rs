@@ -69,10 +69,10 @@ impl Correlator {
         let shifts: Vec<[f64; 2]> = self
             .tiles
             .iter()
-            .filter_map(|(rect, background)| {
+            .filter_map(|(rect, reference)| {
                 let mut tile = self.fourier.windowed(frame, *rect)?;
                 self.fourier.transform(&mut tile, Direction::Forward);
-                self.fourier.peak(&tile, background)
+                self.fourier.peak(&tile, reference)
             })
             .collect();
         if shifts.len() < MIN_TILES {
@@ -237,11 +237,11 @@ impl Fourier {
 
     /// Returns the shift of the first spectrum from the second, pixels: the peak of their phase correlation,
     /// refined below one pixel. Returns `None` when the peak is low.
-    fn peak(&self, frame: &[Complex], background: &[Complex]) -> Option<[f64; 2]> {
+    fn peak(&self, frame: &[Complex], reference: &[Complex]) -> Option<[f64; 2]> {
         let mut ideal = 0.0;
         let product = |k: usize| {
-            let (f, p) = (frame[k], background[k]);
-            let (re, im) = (f.re * p.re + f.im * p.im, f.im * p.re - f.re * p.im);
+            let (f, r) = (frame[k], reference[k]);
+            let (re, im) = (f.re * r.re + f.im * r.im, f.im * r.re - f.re * r.im);
             let length = libm::hypot(re, im);
             let weight = self.weights[k] / (length + self.noise);
             ideal += weight * length;

@@ -100,7 +100,7 @@ impl SquareSums {
     }
 
     /// Returns the values of one sprite, each below 2^15.
-    pub(super) fn row(&self, frame_idx: usize) -> &[u16] {
+    fn row(&self, frame_idx: usize) -> &[u16] {
         &self.values[frame_idx * self.n_values..][..self.n_values]
     }
 

@@ -28,16 +28,14 @@ impl Marks {
     }
 
     /// Returns the number of entries.
-    #[expect(
-        clippy::len_without_is_empty,
-        reason = "no row is asked whether it is empty"
-    )]
+    #[expect(clippy::len_without_is_empty, reason = "no caller needs is_empty")]
     pub fn len(&self) -> usize {
         self.n
     }
 
     /// Marks entry `k`, which must exist.
-    pub fn mark(&mut self, k: usize) {
+    #[cfg(test)]
+    pub(super) fn mark(&mut self, k: usize) {
         debug_assert!(k < self.n, "entry {k} of {}", self.n);
         self.words[k / WORD] |= 1 << (k % WORD);
     }
@@ -176,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_cover_all_that_is_marked_and_pass_over_short_gaps() {
+    fn runs_cover_all_marks_and_include_short_gaps() {
         let row = marks(&b"..##.#....#...#.".map(|c| c == b'#'));
         assert_eq!(row.runs().collect::<Vec<_>>(), [2..6, 10..15]);
         assert_eq!(marks(&[]).runs().count(), 0);
@@ -189,7 +187,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn words_do_what_single_entries_would(
+        fn operations_on_words_equal_those_on_single_entries(
             a in proptest::collection::vec(any::<bool>(), 0..300),
             b in proptest::collection::vec(any::<bool>(), 0..300),
             by in -150isize..150,

@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn of_equal_pairs_the_smaller_is_kept() {
+    fn ties_go_to_the_smaller_pair() {
         let row = [7u64; 6];
         let rows: Vec<&[u64]> = (0..6).map(|i| &row[i..]).collect();
         assert_eq!(minima(&rows, &[true; 6], 8), [(0, 0)]);

@@ -8,7 +8,7 @@
 use super::marks::Marks;
 use super::minima::RADIUS;
 
-/// Tells which pairs of clips need their distance.
+/// Selects the pairs of clips whose distance is needed.
 pub trait PairFilter: Sync {
     /// Marks the needed pairs of clip `i`: entry k of `row` is the pair (i, i + k).
     fn mark(&self, i: usize, row: &mut Marks);
@@ -32,8 +32,8 @@ impl PairFilter for AllPairs {
     }
 }
 
-/// Returns the pairs within `radius` of the pairs in `near`, without those in `requested`. Both hold successive
-/// clips.
+/// Returns the pairs within `radius` of the pairs in `near`, without those in `requested`. Both hold
+/// successive clips.
 pub(super) fn neighbors(near: &[Marks], requested: &[Marks], radius: usize) -> Vec<Marks> {
     let radius = radius as isize;
     let of_clip = |(clip, requested): (usize, &Marks)| {

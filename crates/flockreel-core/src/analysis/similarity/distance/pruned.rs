@@ -1,8 +1,8 @@
 //! Computes only the distances below a limit, and skips most others
 //! (docs/explanation/algorithms.md, "Distances").
 //!
-//! For the needed pairs of a panel (see `pair_filter`), bounds from 16 x 16 squares come first. Pairs with a bound
-//! below the limit get bounds from 8 x 8 squares. Pairs that remain, and their competitors, get exact
+//! For the needed pairs of a panel (see `pair_filter`), bounds from 16 x 16 squares come first. Pairs with a
+//! bound below the limit get bounds from 8 x 8 squares. Pairs that remain, and their competitors, get exact
 //! distances. A needed pair is skipped only if a bound proves that its distance is not below the limit.
 //!
 //! Pairs are indexed by their offset j - i. All frame pairs of one clip pair are then in one column.
@@ -126,8 +126,8 @@ impl<'a> Panel<'a> {
         rows.for_each(|(bounds, row)| bounds.resize(n_frames - row, 0));
     }
 
-    /// Computes the bounds for the frames of all pairs in `candidates`, and drops the pairs whose bound reaches the
-    /// limit.
+    /// Computes the bounds for the frames of all pairs in `candidates`, and drops the pairs whose bound
+    /// reaches the limit.
     fn prune(&mut self, candidates: &mut [Marks], rows: &SquareSums, columns: &SquareSums) {
         let (first, f, cpu) = (self.first, self.distances.clip.frames, self.distances.cpu);
         let (max_bound, limit, weights) = (self.max_bound, self.limit, &self.weights);
@@ -138,7 +138,7 @@ impl<'a> Panel<'a> {
                 rows.write_bounds(cpu, row, columns, row + run.start, bounds);
                 bounds
                     .iter_mut()
-                    .for_each(|bounds| *bounds = (*bounds).min(max_bound));
+                    .for_each(|bound| *bound = (*bound).min(max_bound));
             }
         };
         self.bounds.par_iter_mut().enumerate().for_each(bound_frame);
@@ -191,8 +191,8 @@ fn prune_clip(candidates: &mut Marks, bounds: &[Vec<u32>], weights: &[u64], limi
         for (&weight, row) in weights.iter().zip(bounds) {
             let each = sums.iter_mut().zip(&row[run.clone()]);
             match weight as u32 {
-                1 => each.for_each(|(sum, bounds)| *sum += bounds),
-                weight => each.for_each(|(sum, bounds)| *sum += bounds * weight),
+                1 => each.for_each(|(sum, bound)| *sum += bound),
+                weight => each.for_each(|(sum, bound)| *sum += bound * weight),
             }
         }
         let pruned = run.zip(&sums).filter(|&(_, &sum)| u64::from(sum) >= limit);

@@ -96,7 +96,8 @@ impl Tile<'_> {
         filled(self.rows, rows) && filled(self.columns, columns)
     }
 
-    /// Replaces the contribution of one block to a pair, computed by `disjoint_sums`, by its actual difference `d`.
+    /// Replaces the contribution of one block to a pair, computed by `disjoint_sums`, by its actual
+    /// difference `d`.
     #[inline]
     fn correct(&self, block: usize, [row, column]: [usize; 2], d: u64, sums: &mut SadTile) {
         let disjoint = self.rows.sum(block, row) + self.columns.sum(block, column);

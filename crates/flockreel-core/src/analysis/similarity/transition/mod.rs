@@ -156,7 +156,7 @@ struct Clips {
     clip_frames: usize,
     shown: Vec<bool>,
     usable: Vec<bool>,
-    /// The same as `usable`.
+    /// Marks of the usable clips.
     usable_marks: Marks,
     all_present: Vec<bool>,
 }
@@ -233,13 +233,13 @@ fn thresholds(params: &Params, steps: NaturalSteps) -> Vec<Threshold> {
             epsilon,
         }];
     }
-    let largest = steps.p99 as f64 / steps.median.max(1) as f64;
-    let highest = WIDER_KAPPAS[WIDER_KAPPAS.len() - 1].max(params.kappa);
-    let growing = std::iter::successors(Some(highest), |kappa| Some(KAPPA_GROWTH * kappa)).skip(1);
+    let p99_kappa = steps.p99 as f64 / steps.median.max(1) as f64;
+    let widest = WIDER_KAPPAS[WIDER_KAPPAS.len() - 1].max(params.kappa);
+    let growing = std::iter::successors(Some(widest), |kappa| Some(KAPPA_GROWTH * kappa)).skip(1);
     std::iter::once(params.kappa)
         .chain(WIDER_KAPPAS.into_iter().filter(|&k| k > params.kappa))
-        .chain(growing.take_while(|&kappa| kappa < largest))
-        .chain((largest > highest).then_some(largest))
+        .chain(growing.take_while(|&kappa| kappa < p99_kappa))
+        .chain((p99_kappa > widest).then_some(p99_kappa))
         .map(|kappa| Threshold {
             kappa: Some(kappa),
             // D is an integer, so D < x is equivalent to D < ceil(x).

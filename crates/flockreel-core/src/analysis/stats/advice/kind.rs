@@ -196,7 +196,7 @@ fn percent(share: &f64) -> String {
     format!("{:.0} %", 100.0 * share)
 }
 
-/// Returns what else moved, with time and box.
+/// Returns the sentence about other moving objects, with the time and the box of one.
 fn movers_sentence(n: usize, mover: &Mover) -> String {
     let what = match mover.kind {
         MoverKind::Animal => "an object that looks like the animal",

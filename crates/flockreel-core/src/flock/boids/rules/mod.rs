@@ -67,7 +67,7 @@ struct Requests {
 }
 
 impl Boids<'_> {
-    /// Returns the granted acceleration, at most the greatest of the calibration, body lengths per second
+    /// Returns the allocated acceleration, at most the greatest of the calibration, body lengths per second
     /// squared.
     pub(super) fn acceleration(&self, situation: &Situation) -> Vec3 {
         let limit = self.calibration.acceleration_bl_per_s2();

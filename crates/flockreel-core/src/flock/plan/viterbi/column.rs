@@ -201,16 +201,11 @@ impl Column {
         self.clock
     }
 
-    /// Returns the lanes of the last block that hold frames.
-    pub(super) fn lanes(&self) -> std::ops::Range<usize> {
-        let is_first = self.clock == self.width;
-        (if is_first { self.opening } else { 0 })..self.width
-    }
-
-    /// Returns V, the least cost of paths that may jump, in a lane of the last block, by station, in turns.
-    pub(super) fn values(&self, lane: usize) -> impl Iterator<Item = u32> {
+    /// Returns V, the least cost of paths that may jump, at the last frame processed, by station, in turns.
+    pub(super) fn values(&self) -> impl Iterator<Item = u32> {
+        let last = self.width - 1;
         let stations = self.station_costs[1..].iter();
-        stations.map(move |costs_here| costs_here.values[lane].min(UNREACHED))
+        stations.map(move |costs_here| costs_here.values[last].min(UNREACHED))
     }
 
     /// Returns `[ago][station]`: the least cost, in turns, of paths to the last frame processed that landed
@@ -242,7 +237,7 @@ impl Column {
             values
         };
         let mut ends: Vec<Vec<u32>> = (0..self.dwell - 1).map(landed).collect();
-        ends.push(self.values(last).collect());
+        ends.push(self.values().collect());
         ends
     }
 }

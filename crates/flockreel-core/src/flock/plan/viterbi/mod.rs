@@ -108,8 +108,7 @@ impl PathSearch<'_> {
             column.advance_untraced(self, state_costs);
         }
         // The first frame of the film is processed last, and stations are in reverse order of states.
-        let last = column.lanes().end - 1;
-        let mut costs: Vec<u32> = column.values(last).collect();
+        let mut costs: Vec<u32> = column.values().collect();
         costs.reverse();
         costs
     }

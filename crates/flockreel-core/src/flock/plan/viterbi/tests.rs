@@ -29,9 +29,9 @@ impl Case {
     }
 
     fn search<'a>(&self, trellis: &'a Trellis, cpu: Level) -> PathSearch<'a> {
-        static SHELF: LazyLock<TracePool> = LazyLock::new(TracePool::default);
+        static TRACE_POOL: LazyLock<TracePool> = LazyLock::new(TracePool::default);
         PathSearch {
-            trace_pool: &SHELF,
+            trace_pool: &TRACE_POOL,
             trellis,
             n_frames: self.n_frames,
             dwell: self.dwell,

@@ -28,11 +28,11 @@ pub(super) struct Traceback {
 /// Position of a traceback at the last frame whose state is not known yet.
 #[derive(Clone, Copy)]
 enum Cursor {
-    /// Cursor a station, where a jump is allowed.
+    /// At a station, where a jump is allowed.
     Free(usize),
-    /// Cursor a station (first value), a number of frames after a landing (second value).
+    /// At a station (first value), a number of frames after a landing (second value).
     Landed(usize, usize),
-    /// Cursor the origin of the cheapest jump to the landing station of this rank.
+    /// At the origin of the cheapest jump to the landing station of this rank.
     Origin(usize),
 }
 

@@ -149,7 +149,12 @@ fn fish_summary() -> Value {
 }
 
 /// Calls an operation with an id. Returns the status, and the body with the id replaced by `ID`.
-async fn told(app: &TestApp, call: (&str, &str, &Touch), kind: &str, id: &str) -> (u16, String) {
+async fn response_of(
+    app: &TestApp,
+    call: (&str, &str, &Touch),
+    kind: &str,
+    id: &str,
+) -> (u16, String) {
     let (method, path, touch) = call;
     let path = path.replace("{id}", id).replace("{file}", file_of(kind));
     let request = app.request(method.parse::<Method>().unwrap(), &path);
@@ -170,7 +175,7 @@ async fn told(app: &TestApp, call: (&str, &str, &Touch), kind: &str, id: &str) -
 }
 
 #[tokio::test]
-async fn the_table_names_every_call_of_the_document() {
+async fn table_covers_every_operation_of_the_document() {
     let app = TestApp::idle().await;
     let mut of_document = routes(&app.json("/openapi.json").await);
     let mut of_table: Vec<(Method, String)> = (table().iter())
@@ -187,7 +192,7 @@ async fn the_table_names_every_call_of_the_document() {
 }
 
 #[tokio::test]
-async fn a_stranger_is_told_what_a_random_id_tells() {
+async fn foreign_id_gives_the_response_to_a_random_id() {
     let mut app = TestApp::start(&["--auth", "required"]).await;
     let (owner, stranger) = (
         app.token(Scope::Write, 9).await,
@@ -198,8 +203,8 @@ async fn a_stranger_is_told_what_a_random_id_tells() {
     let mut things = belongings(&app).await;
     // The library of a queued job has an id before it exists.
     let (_, footage) = things.iter().find(|(kind, _)| *kind == "footage").unwrap();
-    let wish = json!({"footage_id": footage});
-    let queued = app.accept("/v1/analyses", wish).await;
+    let request = json!({"footage_id": footage});
+    let queued = app.accept("/v1/analyses", request).await;
     things.push(("queued", queued["library_id"].as_str().unwrap().to_owned()));
     for (method, path, touch) in &table() {
         let call = (*method, *path, touch);
@@ -209,24 +214,27 @@ async fn a_stranger_is_told_what_a_random_id_tells() {
         app.sign_in(&stranger);
         for (kind, id) in &things {
             let random = Uuid::now_v7().to_string();
-            let of_theirs = told(&app, call, wanted, id).await;
-            assert!(matches!(of_theirs.0, 404 | 422), "{method} {path} {kind}");
+            let of_foreign_id = response_of(&app, call, wanted, id).await;
+            assert!(
+                matches!(of_foreign_id.0, 404 | 422),
+                "{method} {path} {kind}"
+            );
             assert_eq!(
-                of_theirs,
-                told(&app, call, wanted, &random).await,
+                of_foreign_id,
+                response_of(&app, call, wanted, &random).await,
                 "{method} {path} {kind}"
             );
         }
         let (_, own) = things.iter().find(|(kind, _)| kind == wanted).unwrap();
         for allowed in [&owner, &admin] {
             app.sign_in(allowed);
-            let (status, body) = told(&app, call, wanted, own).await;
+            let (status, body) = response_of(&app, call, wanted, own).await;
             // An object that the owner deleted is gone for the administrator too.
             let is_gone = *method == "DELETE" && allowed == &admin && status == 404;
             // A substitute library cannot be simulated.
-            let is_stood_in = *path == "/v1/flocks/preview" && status == 500;
+            let is_substitute = *path == "/v1/flocks/preview" && status == 500;
             assert!(
-                status < 300 || status == 409 || is_gone || is_stood_in,
+                status < 300 || status == 409 || is_gone || is_substitute,
                 "{method} {path}: {status} {body}"
             );
         }
@@ -235,7 +243,7 @@ async fn a_stranger_is_told_what_a_random_id_tells() {
 }
 
 #[tokio::test]
-async fn a_list_holds_the_callers_own_and_an_administrator_sees_all() {
+async fn lists_show_own_objects_and_to_administrators_all() {
     let mut app = TestApp::start(&["--auth", "required"]).await;
     let (owner, stranger) = (
         app.token(Scope::Write, 9).await,
@@ -260,14 +268,14 @@ async fn a_list_holds_the_callers_own_and_an_administrator_sees_all() {
 }
 
 #[tokio::test]
-async fn a_link_opens_one_file_for_whoever_holds_it_until_it_ends() {
+async fn signed_link_opens_one_file_until_it_expires() {
     let mut app = TestApp::start(&["--auth", "required"]).await;
     let owner = app.token(Scope::Write, 9).await;
     app.sign_in(&owner);
     let things = belongings(&app).await;
     let flock = &things.iter().find(|(kind, _)| *kind == "flocks").unwrap().1;
     let path = format!("/v1/flocks/{flock}");
-    let ask = |wish: Value| app.post(&format!("{path}/links")).json(&wish).send();
+    let ask = |request: Value| app.post(&format!("{path}/links")).json(&request).send();
     let made = ask(json!({"file": "flock.json", "expires_s": 60}))
         .await
         .unwrap();
@@ -275,11 +283,11 @@ async fn a_link_opens_one_file_for_whoever_holds_it_until_it_ends() {
         .as_str()
         .unwrap()
         .to_owned();
-    for (wish, status) in [
+    for (request, status) in [
         (json!({"file": "lock"}), 404),
         (json!({"expires_s": 1}), 422),
     ] {
-        assert_eq!(ask(wish).await.unwrap().status(), status);
+        assert_eq!(ask(request).await.unwrap().status(), status);
     }
     app.sign_out();
     let file = app.get(&url).send().await.unwrap();
@@ -310,7 +318,7 @@ async fn a_link_opens_one_file_for_whoever_holds_it_until_it_ends() {
 }
 
 #[tokio::test]
-async fn the_same_bytes_of_two_owners_are_two_footage() {
+async fn equal_films_of_two_owners_are_stored_separately() {
     let mut app = TestApp::idle().await;
     let (first, second) = (
         app.token(Scope::Write, 9).await,
