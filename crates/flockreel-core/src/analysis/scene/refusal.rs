@@ -11,6 +11,7 @@ use crate::analysis::params::Follow;
 use crate::analysis::subject::{FITS, Look, MIN_AREA_PX, Subject};
 use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
+use crate::order;
 
 /// Least share of the samples in which the animal must be found, 0..=1. Free choice.
 const MIN_FOUND_SHARE: f64 = 0.05;
@@ -27,6 +28,9 @@ const FREQUENT_SHARE: f64 = 0.3;
 const MAX_AREA_SHARE: f64 = 0.15;
 /// Least area of a second animal, as a share of the animal's area. Free choice.
 const MIN_SECOND_AREA: f64 = 0.5;
+/// Least range of a second animal, as a share of the animal's diagonal. A swaying plant moves less. Free
+/// choice.
+const MIN_RANGE: f64 = 0.5;
 
 /// Moving objects besides the animal that look like it.
 pub(super) enum SimilarObjects {
@@ -115,7 +119,10 @@ fn similar_objects(
             Some((k, [&looks[at], &looks[second_animal(looks, at, subject)?]]))
         })
         .unzip();
-    if (pairs.len() as f64) <= FREQUENT_SHARE * n_samples {
+    let seconds: Vec<&Look> = pairs.iter().map(|[_, second]| *second).collect();
+    if (pairs.len() as f64) <= FREQUENT_SHARE * n_samples
+        || range_px(&seconds) < MIN_RANGE * subject.diagonal_px
+    {
         return Ok(SimilarObjects::None);
     }
     match Mirror::from_pairs(&pairs, subject.diagonal_px) {
@@ -147,6 +154,16 @@ fn second_animal(looks: &[Look], animal: usize, subject: &Subject) -> Option<usi
             && gap_px(&look.box_px, &first.box_px)
                 > longest(&first.box_px).min(longest(&look.box_px))
     })
+}
+
+/// Returns the range of the centroids without the outermost tenth, pixels: the larger of x and y.
+fn range_px(looks: &[&Look]) -> f64 {
+    let along = |axis: usize| {
+        let mut values: Vec<f64> = looks.iter().map(|look| look.centroid_px[axis]).collect();
+        let mut at = |share| order::percentile(&mut values, share).unwrap_or(0.0);
+        at(0.95) - at(0.05)
+    };
+    along(0).max(along(1))
 }
 
 fn longest(rect: &Rect) -> u32 {

@@ -183,6 +183,24 @@ fn changing_light_is_accepted() {
 }
 
 #[test]
+fn object_that_blinks_at_one_place_is_no_second_animal() {
+    let blinking = Disc {
+        center_px: [160.0, 20.0],
+        radius_px: 7.0,
+    };
+    let library = analyzed(60, &Params::default(), |k| {
+        let mut discs = vec![swimmer(k, 0.0, 9.0)];
+        discs.extend((k % 5 < 2).then_some(blinking));
+        Picture::with_discs(discs)
+    });
+    let library = library.expect("one animal swims");
+    for (k, pose) in library.poses.frames.iter().enumerate() {
+        let (found, animal) = (pose.centroid_px.unwrap(), swimmer(k, 0.0, 9.0).center_px);
+        assert!((found[0] - animal[0]).hypot(found[1] - animal[1]) < 2.0);
+    }
+}
+
+#[test]
 fn two_animals_are_refused_unless_the_largest_is_followed() {
     let two = |k: usize| Picture::with_discs(vec![swimmer(k, 0.0, 10.0), swimmer(k, 3.1, 8.0)]);
     let (code, sentence) = refusal(60, two);
