@@ -4,7 +4,8 @@
 //!
 //! Requests are counted per owner and not per address, because many users may share an address, and a header
 //! that names another address can be forged. Requests refused with 401 have no owner. They are counted by the
-//! address of the connection.
+//! address of the connection. A crate for rate limits would replace only the bucket, the smaller part of this
+//! file.
 
 use std::collections::HashMap;
 use std::hash::Hash;

@@ -1,5 +1,5 @@
 //! poses.csv: one row per frame with the scalars of poses.json, empty if null (docs/reference/formats.md,
-//! "CSV files").
+//! "CSV files"). Cells are numbers, `true` or `false`, so nothing needs quotes and no crate for CSV.
 
 use serde_json::Value;
 

@@ -50,7 +50,8 @@ impl Pen {
     }
 
     /// Adds text in a 5 x 7 dot font, with the upper left corner at `at` and dots `dot_px` wide. The font has
-    /// the digits, the point and the letter s; other characters are blank.
+    /// the digits, the point and the letter s; other characters are blank. A font crate would need a font
+    /// file.
     pub fn text(&mut self, text: &str, at: [f64; 2], dot_px: f64) {
         let half = dot_px / 2.0;
         for (n, character) in text.chars().enumerate() {

@@ -148,7 +148,8 @@ fn largest_component(graph: &Graph, n_frames: usize) -> Vec<u32> {
     best
 }
 
-/// Returns every strongly connected component (Tarjan 1972), with an explicit stack instead of recursion.
+/// Returns every strongly connected component (Tarjan 1972), with an explicit stack instead of recursion. A
+/// graph crate would need a copy of the graph in its own form.
 fn strong_components(graph: &Graph, n_states: u32) -> Vec<Vec<u32>> {
     const UNVISITED: u32 = u32::MAX;
     let mut order = vec![UNVISITED; n_states as usize];

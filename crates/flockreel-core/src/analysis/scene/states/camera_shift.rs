@@ -5,6 +5,8 @@
 //! only, so light may change. Swaying plants and glittering water shift only their own tiles. The shift of
 //! the camera is the one on which most tiles agree. Shifts above half a tile are not found; then most of the
 //! picture differs, which `states` and `refusal` detect.
+//!
+//! The Fourier transform is our own, because that of a crate sums in an order that depends on the machine.
 
 use std::f64::consts::TAU;
 
