@@ -2,7 +2,11 @@
 //! child gets arguments as a list, an empty environment, allow-lists, a sandbox, a time limit and a stall
 //! limit. Dropping its handle kills and reaps the whole process group.
 //!
-//! The time limit counts only while we wait for the child. A slow caller does not use up its decoder's time.
+//! The time limit counts only while we wait for the child and the child has a processor or waits for
+//! something else. A slow caller and a busy machine do not use up a decoder's time. The limit on processor time
+//! stops a child that computes forever.
+
+mod processor_wait;
 
 use std::io::{self, Read, Write};
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
@@ -19,6 +23,7 @@ use super::error::Error;
 use super::exit::{Exit, hide_paths};
 use super::invocation::Invocation;
 use super::sandbox::{self, Policy};
+use processor_wait::processor_wait;
 
 /// Length of the kept end of a child's stderr, bytes. Free choice.
 const STDERR_TAIL_BYTES: usize = 8 << 10;
@@ -45,6 +50,8 @@ pub(super) struct Child {
     /// End of the time limit by the wall clock, for `read_some`.
     deadline: Instant,
     stall_limit: Duration,
+    /// Time in which the child waited for a processor, as far as it was added to the limits.
+    credited: Duration,
     /// Files given to the child. Their paths are removed from its messages, because users do not know them.
     files: Vec<PathBuf>,
 }
@@ -108,6 +115,7 @@ impl Child {
             time_left: invocation.time_limit,
             deadline: Instant::now() + invocation.time_limit,
             stall_limit: invocation.stall_limit,
+            credited: Duration::ZERO,
             files: [policy.input, policy.output]
                 .into_iter()
                 .flatten()
@@ -121,10 +129,10 @@ impl Child {
         let Some(mut stdout) = self.stdout.take() else {
             return Ok(0);
         };
-        let deadline = Instant::now() + self.stall_limit;
+        let mut deadline = Instant::now() + self.stall_limit;
         let mut n_read = 0;
         while n_read < buffer.len() {
-            self.wait_for(stdout.as_fd(), PollFlags::IN, deadline)?;
+            self.wait_for(stdout.as_fd(), PollFlags::IN, &mut deadline)?;
             match stdout.read(&mut buffer[n_read..]) {
                 Ok(0) => break,
                 Ok(n) => n_read += n,
@@ -148,7 +156,7 @@ impl Child {
         self.wait_for(
             stdout.as_fd(),
             PollFlags::IN,
-            Instant::now() + self.stall_limit,
+            &mut (Instant::now() + self.stall_limit),
         )?;
         let n_read = stdout
             .read(buffer)
@@ -162,13 +170,13 @@ impl Child {
         let Some(mut stdin) = self.stdin.take() else {
             return Err(Error::BadOutput("a frame after the last"));
         };
-        let deadline = Instant::now() + self.stall_limit;
+        let mut deadline = Instant::now() + self.stall_limit;
         while !bytes.is_empty() {
             match stdin.write(bytes) {
                 Ok(n) => bytes = &bytes[n..],
                 Err(error) => match error.kind() {
                     io::ErrorKind::WouldBlock => {
-                        self.wait_for(stdin.as_fd(), PollFlags::OUT, deadline)?;
+                        self.wait_for(stdin.as_fd(), PollFlags::OUT, &mut deadline)?;
                     }
                     io::ErrorKind::Interrupted => {}
                     io::ErrorKind::BrokenPipe => {
@@ -207,7 +215,8 @@ impl Child {
         self.stdout = None;
         let watching = Error::io("watching the media tool");
         let pidfd = self.pidfd.try_clone().map_err(watching)?;
-        self.wait_for(pidfd.as_fd(), PollFlags::IN, Instant::now() + time_limit)?;
+        let mut deadline = Instant::now() + time_limit;
+        self.wait_for(pidfd.as_fd(), PollFlags::IN, &mut deadline)?;
         // The child has exited but is not reaped, so its process id is still valid. Kill any processes that
         // it started.
         rustix::process::kill_process_group(self.group, Signal::KILL).ok();
@@ -222,12 +231,13 @@ impl Child {
         })
     }
 
-    /// Waits until `fd` is ready, at most until `deadline` and within the remaining time.
+    /// Waits until `fd` is ready, at most until `deadline` and within the remaining time. Both move by the time
+    /// in which the child waited for a processor.
     fn wait_for(
         &mut self,
         fd: BorrowedFd<'_>,
         flags: PollFlags,
-        deadline: Instant,
+        deadline: &mut Instant,
     ) -> Result<(), Error> {
         loop {
             let start = Instant::now();
@@ -242,12 +252,34 @@ impl Child {
                 rustix::event::poll(&mut [PollFd::from_borrowed_fd(fd, flags)], Some(&timeout));
             self.time_left = self.time_left.saturating_sub(start.elapsed());
             match n_ready {
-                Ok(0) => return Err(Error::TimeLimit),
+                Ok(0) => {
+                    let credit = self.credit();
+                    if credit.is_zero() {
+                        return Err(Error::TimeLimit);
+                    }
+                    self.time_left += credit;
+                    self.deadline += credit;
+                    *deadline += credit;
+                }
                 Ok(_) => return Ok(()),
                 Err(rustix::io::Errno::INTR) => {}
                 Err(errno) => return Err(Error::io("waiting for the media tool")(errno.into())),
             }
         }
+    }
+}
+
+impl Child {
+    /// Returns the time in which the child waited for a processor since the last call, at most the stall
+    /// limit. Below a tenth of that limit it is no reason for a delay, and zero.
+    fn credit(&mut self) -> Duration {
+        let waited = processor_wait(self.group);
+        let credit = waited.saturating_sub(self.credited);
+        self.credited = waited;
+        if credit < self.stall_limit / 10 {
+            return Duration::ZERO;
+        }
+        credit.min(self.stall_limit)
     }
 }
 
