@@ -147,8 +147,8 @@ impl Child {
     /// Reads the available output of the child; 0 at its end. Here the time limit counts all the time,
     /// because a child with endless output never makes us wait.
     pub(super) fn read_some(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
-        if Instant::now() > self.deadline {
-            return Err(Error::TimeLimit);
+        while Instant::now() > self.deadline {
+            self.extend_limits()?;
         }
         let Some(mut stdout) = self.stdout.take() else {
             return Ok(0);
@@ -252,34 +252,28 @@ impl Child {
                 rustix::event::poll(&mut [PollFd::from_borrowed_fd(fd, flags)], Some(&timeout));
             self.time_left = self.time_left.saturating_sub(start.elapsed());
             match n_ready {
-                Ok(0) => {
-                    let credit = self.credit();
-                    if credit.is_zero() {
-                        return Err(Error::TimeLimit);
-                    }
-                    self.time_left += credit;
-                    self.deadline += credit;
-                    *deadline += credit;
-                }
+                Ok(0) => *deadline += self.extend_limits()?,
                 Ok(_) => return Ok(()),
                 Err(rustix::io::Errno::INTR) => {}
                 Err(errno) => return Err(Error::io("waiting for the media tool")(errno.into())),
             }
         }
     }
-}
 
-impl Child {
-    /// Returns the time in which the child waited for a processor since the last call, at most the stall
-    /// limit. Below a tenth of that limit it is no reason for a delay, and zero.
-    fn credit(&mut self) -> Duration {
-        let waited = processor_wait(self.group);
-        let credit = waited.saturating_sub(self.credited);
-        self.credited = waited;
-        if credit < self.stall_limit / 10 {
-            return Duration::ZERO;
+    /// Extends the time limit by the time in which the child waited for a processor, as far as it was not
+    /// extended for it before, and at most by the stall limit. Returns the extension. Fails with
+    /// [`Error::TimeLimit`] if the child waited less than a tenth of the stall limit, because then it was not
+    /// the lack of a processor that took the time.
+    fn extend_limits(&mut self) -> Result<Duration, Error> {
+        let waited = processor_wait(self.group).saturating_sub(self.credited);
+        let extension = waited.min(self.stall_limit);
+        if extension.is_zero() || extension < self.stall_limit / 10 {
+            return Err(Error::TimeLimit);
         }
-        credit.min(self.stall_limit)
+        self.credited += extension;
+        self.time_left += extension;
+        self.deadline += extension;
+        Ok(extension)
     }
 }
 
