@@ -12,6 +12,7 @@ use super::footage::{Naming, admit};
 use super::jobs::accepted;
 use super::problem::{Answer, Problem, ProblemBody};
 use super::receive::{Form, is_film, receive_with_json};
+use super::resources::Reference;
 use crate::jobs::IdSequence;
 use crate::jobs::analysis::Input;
 use crate::store::footage::{Added, Footage};
@@ -24,9 +25,9 @@ use flockreel_core::ids::{FootageId, JobId, LibraryId};
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AnalysisRequest {
-    /// Footage to measure.
-    #[schema(value_type = uuid::Uuid)]
-    footage_id: FootageId,
+    /// Id of the footage to measure, or `sample`: the newest sample.
+    #[schema(value_type = String)]
+    footage_id: Reference,
     /// Parameters to override. They override the values of `preset`, or the defaults if there is no preset.
     #[serde(default)]
     #[schema(value_type = AnalysisOverrides)]
@@ -121,7 +122,8 @@ pub(super) async fn create_analysis(
     } else {
         let Json(request) = Json::<AnalysisRequest>::from_request(request, &access.state).await?;
         let params: Params = params::read(request.params)?;
-        let footage_id = request.footage_id;
+        let footage_id = access.id_of::<Footage>(request.footage_id).await?;
+        let footage_id = FootageId(footage_id);
         let owners = &access.caller.owners;
         let footage = access.store().resource::<Footage>(footage_id.0, owners);
         if footage.await?.is_none() {

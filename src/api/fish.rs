@@ -7,16 +7,18 @@ use serde_json::{Map, Value};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::download::{Download, Files, disposition, find as find_file};
+use super::download::names::{saved_as, stem};
+use super::download::{Download, Files, find as find_file};
 use super::extract::{Access, Conditions, FileOf, Id, Json};
 use super::jobs::{accepted, job_to_follow};
-use super::paging::{Page, Paging};
+use super::paging::{FilmQuery, Filtered, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
-use super::resources::View;
+use super::resources::{FileView, Reference, ResultView, View};
 use super::timestamp::rfc3339;
 use crate::jobs::IdSequence;
 use crate::jobs::fish::{Input, Summary};
-use crate::store::resources::{FilmRow, Fish};
+use crate::store::jobs::JobState;
+use crate::store::resources::{FilmRow, Fish, Library};
 use flockreel_core::fish::Params;
 use flockreel_core::formats::params;
 use flockreel_core::ids::{FishId, JobId, LibraryId};
@@ -31,9 +33,9 @@ const FILES: Files = &[
 /// The parameters override the values of `preset`, or the defaults if there is no preset.
 #[derive(Debug, Deserialize, ToSchema)]
 pub(super) struct FishRequest {
-    /// Library whose poses move the fish.
-    #[schema(value_type = Uuid)]
-    library_id: LibraryId,
+    /// Id of the library whose poses move the fish, or `sample`: the newest library of the sample.
+    #[schema(value_type = String)]
+    library_id: Reference,
     #[serde(flatten)]
     #[schema(value_type = Params)]
     params: Map<String, Value>,
@@ -56,8 +58,13 @@ pub(super) struct FishView {
     id: Uuid,
     /// Job that made the virtual fish.
     job_id: Uuid,
+    /// State of the job: always `done`. Before, this address answers 404 with `not_ready`, or with the reason
+    /// why there is no virtual fish.
+    state: &'static str,
     /// Library whose poses move the fish.
     library_id: Uuid,
+    /// Name of the footage.
+    name: String,
     /// Whether it was made from the sample of an empty data folder.
     sample: bool,
     /// Size of all files, bytes.
@@ -69,6 +76,9 @@ pub(super) struct FishView {
     params: Value,
     #[serde(flatten)]
     summary: Summary,
+    /// Files that can be downloaded, by name. Only in the response for one virtual fish.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    files: Option<Vec<FileView>>,
 }
 
 /// Start making a virtual fish.
@@ -92,7 +102,8 @@ pub(super) async fn create_fish(
     Json(request): Json<FishRequest>,
 ) -> Answer {
     let params: Params = params::read(request.params)?;
-    let library_id = request.library_id;
+    let library_id = access.id_of::<Library>(request.library_id).await?;
+    let library_id = LibraryId(library_id);
     let after_job = job_to_follow(&access, library_id).await?;
     let input = Input { library_id, params };
     let (job_id, fish_id) = access.enqueue(&input, after_job, &mut ids).await?;
@@ -101,12 +112,15 @@ pub(super) async fn create_fish(
 }
 
 /// List all virtual fish, newest first.
-#[utoipa::path(get, path = "/v1/fish", params(Paging), responses(
+#[utoipa::path(get, path = "/v1/fish", params(FilmQuery), responses(
     (status = 200, body = Page<FishView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn list_fish(access: Access, paging: Paging) -> JsonAnswer<Page<FishView>> {
-    access.list(paging).await
+pub(super) async fn list_fish(
+    access: Access,
+    query: Filtered<FilmQuery>,
+) -> JsonAnswer<Page<FishView>> {
+    access.list(query.0).await
 }
 
 /// Get one virtual fish: a summary and its parameters.
@@ -118,7 +132,7 @@ pub(super) async fn list_fish(access: Access, paging: Paging) -> JsonAnswer<Page
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_fish(access: Access, Id(id): Id) -> JsonAnswer<FishView> {
-    access.get(id).await
+    access.get_result(id).await
 }
 
 /// Delete a virtual fish and its job.
@@ -151,12 +165,12 @@ pub(super) async fn get_fish_file(
     let (name, media_type) = find_file(FILES, &name)?;
     let fish = access.find::<Fish>(id).await?;
     let extension = if name == "video.mp4" { "mp4" } else { "glb" };
-    let label = format!("fish-{id}.{extension}");
+    let label = format!("{}_fish.{extension}", stem(&fish.name));
     let download = Download {
         folder: &fish.folder,
         name,
         media_type,
-        disposition: disposition("inline", &label),
+        disposition: saved_as(media_type, &label),
     };
     download.answer(access.store(), &conditions).await
 }
@@ -172,12 +186,30 @@ impl View for FishView {
         Ok(FishView {
             id: row.id,
             job_id: row.job_id,
+            state: JobState::Done.name(),
             library_id: row.library_id,
+            name: row.name,
             sample: row.sample,
             size_bytes: row.size_bytes,
             created_at: rfc3339(row.created_ms),
             params: super::stored(&row.params)?,
             summary: super::stored(&row.summary)?,
+            files: None,
         })
+    }
+}
+
+impl ResultView for FishView {
+    const FILES: Files = FILES;
+
+    fn folder(row: &FilmRow) -> &str {
+        &row.folder
+    }
+
+    fn with_files(self, files: Vec<FileView>) -> FishView {
+        FishView {
+            files: Some(files),
+            ..self
+        }
     }
 }

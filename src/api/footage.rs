@@ -11,17 +11,18 @@ use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
 use super::AppState;
+use super::download::names::{saved_as, stem};
 use super::download::{Download, disposition};
-use super::extract::{Access, Conditions, Id};
-use super::paging::{Page, Paging};
+use super::extract::{Access, Conditions, Id, Json};
+use super::paging::{Filtered, FootageQuery, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
-use super::receive::receive;
+use super::receive::{label, receive};
 use super::resources::View;
 use super::timestamp::rfc3339;
 use crate::jobs::admit::ReceivedFiles;
 use crate::jobs::{Error, admit};
 use crate::store::blobs::hex;
-use crate::store::footage::{Added, Footage, VIDEO};
+use crate::store::footage::{Added, Footage, POSTER, VIDEO};
 
 /// An uploaded video.
 #[derive(Clone, Debug, Serialize, ToSchema)]
@@ -31,7 +32,7 @@ pub(super) struct FootageView {
     name: String,
     /// SHA-256 of the video file, hexadecimal.
     sha256: String,
-    /// Size of the video, the background and the masks together, bytes.
+    /// Size of the video, the background, the masks and the poster together, bytes.
     size_bytes: i64,
     /// Width and height of the picture, square pixels.
     image_size_px: [i64; 2],
@@ -47,6 +48,14 @@ pub(super) struct FootageView {
     sample: bool,
     /// Time of the upload, RFC 3339 in UTC.
     created_at: String,
+}
+
+/// New properties of footage.
+#[derive(Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FootageChange {
+    /// Name for people; may be empty.
+    name: String,
 }
 
 /// Query parameters of an upload.
@@ -123,12 +132,15 @@ pub(super) async fn admit(state: &AppState, received: ReceivedFiles) -> Result<A
 }
 
 /// List all footage, newest first.
-#[utoipa::path(get, path = "/v1/footage", params(Paging), responses(
+#[utoipa::path(get, path = "/v1/footage", params(FootageQuery), responses(
     (status = 200, body = Page<FootageView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn list_footage(access: Access, paging: Paging) -> JsonAnswer<Page<FootageView>> {
-    access.list(paging).await
+pub(super) async fn list_footage(
+    access: Access,
+    query: Filtered<FootageQuery>,
+) -> JsonAnswer<Page<FootageView>> {
+    access.list(query.0).await
 }
 
 /// Get one footage.
@@ -137,6 +149,29 @@ pub(super) async fn list_footage(access: Access, paging: Paging) -> JsonAnswer<P
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_footage(access: Access, Id(id): Id) -> JsonAnswer<FootageView> {
+    access.get(id).await
+}
+
+/// Rename footage.
+///
+/// The libraries, flocks and virtual fish made from it show the new name too. Like the name of an upload, it is
+/// cut to 200 characters and loses folders and control characters.
+#[utoipa::path(patch, path = "/v1/footage/{id}", params(("id" = Uuid, Path)), request_body = FootageChange,
+    responses(
+    (status = 200, body = FootageView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn rename_footage(
+    access: Access,
+    Id(id): Id,
+    Json(change): Json<FootageChange>,
+) -> JsonAnswer<FootageView> {
+    access.find::<Footage>(id).await?;
+    let (name, owners) = (label(&change.name), &access.caller.owners);
+    if !access.store().rename_footage(id, &name, owners).await? {
+        return Err(Problem::not_found());
+    }
     access.get(id).await
 }
 
@@ -171,6 +206,31 @@ pub(super) async fn get_footage_file(access: Access, Id(id): Id, conditions: Con
         name: VIDEO,
         media_type: "application/octet-stream",
         disposition: disposition("attachment", label),
+    };
+    download.answer(access.store(), &conditions).await
+}
+
+/// Get a frame of the video as a picture.
+///
+/// It is a JPEG of at most 640 pixels in width. Fails with `not_found` for footage that was uploaded to a
+/// version without posters.
+#[utoipa::path(get, path = "/v1/footage/{id}/poster.jpg", params(("id" = Uuid, Path)), responses(
+    (status = 200, content_type = "image/jpeg"),
+    (status = 206, content_type = "image/jpeg"),
+    (status = 304, description = "not modified"),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn get_footage_poster(
+    access: Access,
+    Id(id): Id,
+    conditions: Conditions,
+) -> Answer {
+    let footage = access.find::<Footage>(id).await?;
+    let download = Download {
+        folder: &footage.folder,
+        name: POSTER,
+        media_type: "image/jpeg",
+        disposition: saved_as("image/jpeg", &format!("{}_{POSTER}", stem(&footage.name))),
     };
     download.answer(access.store(), &conditions).await
 }

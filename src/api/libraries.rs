@@ -9,14 +9,16 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::AppState;
-use super::download::{Download, Files, built, disposition, find as find_file};
+use super::download::names::{saved_as, stem};
+use super::download::{Download, Files, built, find as find_file, matches};
 use super::extract::{Access, Conditions, FileOf, Id};
-use super::paging::{Page, Paging};
+use super::paging::{Filtered, LibraryQuery, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
-use super::resources::View;
+use super::resources::{FileView, ResultView, View};
 use super::timestamp::rfc3339;
 use crate::jobs::analysis::Summary;
 use crate::jobs::{self, synchronous};
+use crate::store::jobs::JobState;
 use crate::store::resources::Library;
 
 const FILES: Files = &[
@@ -24,6 +26,14 @@ const FILES: Files = &[
     ("poses.json", "application/json"),
     ("poses.csv", "text/csv; charset=utf-8"),
     ("background.png", "image/png"),
+    ("poster.jpg", "image/jpeg"),
+    ("film.mp4", "video/mp4"),
+    ("atlas.json", "application/json"),
+    ("atlas-0.webp", "image/webp"),
+    ("atlas-1.webp", "image/webp"),
+    ("atlas-2.webp", "image/webp"),
+    ("atlas-3.webp", "image/webp"),
+    ("atlas-small-0.webp", "image/webp"),
     ("occluders.png", "image/png"),
     ("distance.png", "image/png"),
     ("candidates.png", "image/png"),
@@ -45,6 +55,9 @@ pub(super) struct LibraryView {
     id: Uuid,
     /// Job that made the library.
     job_id: Uuid,
+    /// State of the job: always `done`. Before, this address answers 404 with `not_ready`, or with the reason
+    /// why there is no library.
+    state: &'static str,
     /// Footage that was measured.
     footage_id: Uuid,
     /// Name of the footage.
@@ -60,18 +73,21 @@ pub(super) struct LibraryView {
     params: Value,
     #[serde(flatten)]
     summary: Summary,
+    /// Files that can be downloaded, by name. Only in the response for one library.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    files: Option<Vec<FileView>>,
 }
 
 /// List all libraries, newest first.
-#[utoipa::path(get, path = "/v1/libraries", params(Paging), responses(
+#[utoipa::path(get, path = "/v1/libraries", params(LibraryQuery), responses(
     (status = 200, body = Page<LibraryView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn list_libraries(
     access: Access,
-    paging: Paging,
+    query: Filtered<LibraryQuery>,
 ) -> JsonAnswer<Page<LibraryView>> {
-    access.list(paging).await
+    access.list(query.0).await
 }
 
 /// Get one library: a summary, its parameters and advice.
@@ -83,7 +99,7 @@ pub(super) async fn list_libraries(
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_library(access: Access, Id(id): Id) -> JsonAnswer<LibraryView> {
-    access.get(id).await
+    access.get_result(id).await
 }
 
 /// Delete a library and everything made from it.
@@ -106,6 +122,8 @@ pub(super) async fn delete_library(access: Access, Id(id): Id) -> Result<StatusC
 /// - `distance.npy`: the distances as a NumPy array, for footage of at most 8192 frames
 /// - `headings.svg`, `trajectory.svg`, `confidence.svg`, `transitions.svg`: charts
 /// - `overlay.mp4`: the footage with its poses drawn over it
+/// - `film.mp4`, `poster.jpg`: the footage as browsers can play it, at most 960 pixels wide; and one frame
+/// - `atlas.json`, `atlas-0.webp` and further pages: the sprites of playback in few pictures
 /// - `sprites.zip`: the sprites, one PNG per frame
 /// - `mattes.zip`: the animal cut out of every frame as filmed, one PNG per frame
 ///
@@ -134,9 +152,14 @@ pub(super) async fn get_library_file(
         folder: &library.folder,
         name,
         media_type,
-        disposition: disposition("inline", name),
+        disposition: saved_as(media_type, &saved_name(&library, name)),
     };
     download.answer(access.store(), &conditions).await
+}
+
+/// Returns the name under which a browser saves the file.
+fn saved_name(library: &Library, name: &str) -> String {
+    format!("{}_{name}", stem(&library.name))
 }
 
 /// Returns distance.npy. The library's files never change, so clients may cache the result forever.
@@ -147,7 +170,8 @@ async fn distance_array(state: &AppState, library: &Library, conditions: &Condit
         header::CACHE_CONTROL,
         "private, max-age=31536000, immutable",
     );
-    if known.is_some_and(|known| known.as_bytes() == etag.as_bytes()) {
+    let known = known.and_then(|tags| tags.to_str().ok());
+    if known.is_some_and(|tags| matches(tags, &etag)) {
         return built(answer.status(StatusCode::NOT_MODIFIED).body(Body::empty()));
     }
     let file = synchronous::distance_file(&state.context, library).await?;
@@ -159,7 +183,10 @@ async fn distance_array(state: &AppState, library: &Library, conditions: &Condit
             .header(header::CONTENT_LENGTH, n_bytes)
             .header(
                 header::CONTENT_DISPOSITION,
-                disposition("attachment", DISTANCE_ARRAY),
+                saved_as(
+                    "application/octet-stream",
+                    &saved_name(library, DISTANCE_ARRAY),
+                ),
             )
             .body(Body::from_stream(file)),
     )
@@ -176,6 +203,7 @@ impl View for LibraryView {
         Ok(LibraryView {
             id: row.id,
             job_id: row.job_id,
+            state: JobState::Done.name(),
             footage_id: row.footage_id,
             name: row.name,
             sample: row.sample,
@@ -183,6 +211,22 @@ impl View for LibraryView {
             created_at: rfc3339(row.created_ms),
             params: super::stored(&row.params)?,
             summary: super::stored(&row.summary)?,
+            files: None,
         })
+    }
+}
+
+impl ResultView for LibraryView {
+    const FILES: Files = FILES;
+
+    fn folder(row: &Library) -> &str {
+        &row.folder
+    }
+
+    fn with_files(self, files: Vec<FileView>) -> LibraryView {
+        LibraryView {
+            files: Some(files),
+            ..self
+        }
     }
 }

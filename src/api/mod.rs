@@ -44,11 +44,13 @@ pub use access::signed;
 pub use monitoring::metrics::{metrics_router, worker_metrics_router};
 pub use problem::Problem;
 
+use download::compression;
+
 use access::{HostNames, Rates, authenticate, guard, session};
 use monitoring::metrics::Metrics;
 use monitoring::observe::{Requests, observe};
 use monitoring::{health, metrics};
-use page::{docs, openapi};
+use page::{docs, errors, examples, openapi};
 use receive::CHUNK_TIMEOUT;
 
 use crate::config::Config;
@@ -123,6 +125,7 @@ pub fn router(state: AppState) -> Router {
     let (routes, mut document) = table().split_for_parts();
     openapi::add_headers(&mut document);
     openapi::join_flattened(&mut document);
+    examples::add(&mut document);
     let requests = state.requests.clone();
     let names = if state.config.requires_tokens() {
         HostNames::Any
@@ -149,6 +152,8 @@ pub fn router(state: AppState) -> Router {
         .layer(DefaultBodyLimit::max(MAX_JSON_BYTES))
         .layer(RequestBodyTimeoutLayer::new(CHUNK_TIMEOUT))
         .layer(CatchPanicLayer::custom(panic_response))
+        .layer(compression::layer())
+        .layer(middleware::from_fn(compression::negotiate))
         .layer(middleware::from_fn_with_state(state, refuse_while_stopping))
         .layer(middleware::from_fn_with_state(names, guard))
         .layer(middleware::from_fn_with_state(requests, observe))
@@ -158,8 +163,13 @@ pub fn router(state: AppState) -> Router {
 fn table() -> OpenApiRouter<AppState> {
     OpenApiRouter::with_openapi(openapi::Document::openapi())
         .routes(routes!(footage::create_footage, footage::list_footage))
-        .routes(routes!(footage::get_footage, footage::delete_footage))
+        .routes(routes!(
+            footage::get_footage,
+            footage::rename_footage,
+            footage::delete_footage
+        ))
         .routes(routes!(footage::get_footage_file))
+        .routes(routes!(footage::get_footage_poster))
         .routes(routes!(uploads::describe_uploads, uploads::create_upload))
         .routes(routes!(
             uploads::head_upload,
@@ -183,6 +193,7 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(jobs::get_refused_jpeg))
         .routes(routes!(jobs::events::get_job_events))
         .routes(routes!(jobs::events::get_events))
+        .routes(routes!(errors::list_errors))
         .routes(routes!(session::begin_session, session::end_session))
         .routes(routes!(health::healthz))
         .routes(routes!(health::readyz))

@@ -1,15 +1,17 @@
-//! Paging of lists: newest first, with a cursor to the next page.
+//! Paging and filters of lists: newest first, with a cursor to the next page.
 //!
 //! The cursor is the id of the last item of a page. Items that are added or deleted meanwhile therefore
 //! do not shift the following pages.
 
 use axum::extract::{FromRequestParts, Query};
 use axum::http::request::Parts;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
 use super::Problem;
+use crate::store::resources::ResourceFilter;
 use flockreel_core::code::Code;
 
 /// Largest page, items. Free choice.
@@ -28,6 +30,66 @@ pub(super) struct Paging {
     pub cursor: Option<Uuid>,
 }
 
+/// Query parameters of the list of footage.
+#[derive(Clone, Debug, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct FootageQuery {
+    /// Maximum number of items, 1..=200.
+    #[serde(default = "default_limit")]
+    #[param(minimum = 1, maximum = 200, default = 50)]
+    limit: i64,
+    /// `next_cursor` of the previous page. Without it the first page is returned.
+    cursor: Option<Uuid>,
+    /// Text that the name contains, in any case.
+    q: Option<String>,
+}
+
+/// Query parameters of the list of libraries.
+#[derive(Clone, Debug, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct LibraryQuery {
+    /// Maximum number of items, 1..=200.
+    #[serde(default = "default_limit")]
+    #[param(minimum = 1, maximum = 200, default = 50)]
+    limit: i64,
+    /// `next_cursor` of the previous page. Without it the first page is returned.
+    cursor: Option<Uuid>,
+    /// Footage that the libraries were made from.
+    footage_id: Option<Uuid>,
+    /// Text that the name of the footage contains, in any case.
+    q: Option<String>,
+}
+
+/// Query parameters of the lists of flocks and virtual fish.
+#[derive(Clone, Debug, Deserialize, IntoParams)]
+#[serde(deny_unknown_fields)]
+#[into_params(parameter_in = Query)]
+pub(super) struct FilmQuery {
+    /// Maximum number of items, 1..=200.
+    #[serde(default = "default_limit")]
+    #[param(minimum = 1, maximum = 200, default = 50)]
+    limit: i64,
+    /// `next_cursor` of the previous page. Without it the first page is returned.
+    cursor: Option<Uuid>,
+    /// Footage that they were made from.
+    footage_id: Option<Uuid>,
+    /// Library that they were made from.
+    library_id: Option<Uuid>,
+    /// Text that the name of the footage contains, in any case.
+    q: Option<String>,
+}
+
+/// A page of a list, and the filter of the list.
+#[derive(Clone, Debug)]
+pub(super) struct Listing {
+    /// The page.
+    pub paging: Paging,
+    /// The filter.
+    pub filter: ResourceFilter,
+}
+
 /// One page of a list.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 pub(super) struct Page<T> {
@@ -38,6 +100,15 @@ pub(super) struct Page<T> {
 }
 
 impl Paging {
+    /// Fails with `invalid_params` if the limit is out of range.
+    fn checked(self) -> Result<Paging, Problem> {
+        if (1..=MAX_LIMIT).contains(&self.limit) {
+            return Ok(self);
+        }
+        let sentence = format!("limit must lie in 1..=200: {}", self.limit);
+        Err(Problem::new(Code::InvalidParams, sentence))
+    }
+
     /// Returns the number of rows to query: one more than fit on the page, to see whether there is a next page.
     pub(super) fn n_rows(self) -> i64 {
         self.limit + 1
@@ -59,16 +130,68 @@ impl<S: Send + Sync> FromRequestParts<S> for Paging {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Paging, Problem> {
-        let invalid = |sentence: String| Problem::new(Code::InvalidParams, sentence);
-        let query = Query::<Paging>::from_request_parts(parts, state).await;
-        let Query(paging) = query.map_err(|rejection| invalid(rejection.body_text()))?;
-        if !(1..=MAX_LIMIT).contains(&paging.limit) {
-            return Err(invalid(format!(
-                "limit must lie in 1..=200: {}",
-                paging.limit
-            )));
-        }
-        Ok(paging)
+        read::<Paging, S>(parts, state).await?.checked()
+    }
+}
+
+/// Query parameters of a filtered list. `Q` is one of the structs above.
+pub(super) struct Filtered<Q>(pub Listing, std::marker::PhantomData<Q>);
+
+impl<S: Send + Sync, Q: DeserializeOwned + Into<Listing>> FromRequestParts<S> for Filtered<Q> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Filtered<Q>, Problem> {
+        let listing: Listing = read::<Q, S>(parts, state).await?.into();
+        listing.paging.checked()?;
+        Ok(Filtered(listing, std::marker::PhantomData))
+    }
+}
+
+async fn read<Q: DeserializeOwned, S: Send + Sync>(
+    parts: &mut Parts,
+    state: &S,
+) -> Result<Q, Problem> {
+    let query = Query::<Q>::from_request_parts(parts, state).await;
+    let query = query.map_err(|error| Problem::new(Code::InvalidParams, error.body_text()));
+    query.map(|Query(query)| query)
+}
+
+impl From<FootageQuery> for Listing {
+    fn from(query: FootageQuery) -> Listing {
+        let FootageQuery { limit, cursor, q } = query;
+        let filter = ResourceFilter {
+            name_contains: q,
+            ..ResourceFilter::default()
+        };
+        let paging = Paging { limit, cursor };
+        Listing { paging, filter }
+    }
+}
+
+impl From<LibraryQuery> for Listing {
+    fn from(query: LibraryQuery) -> Listing {
+        let filter = ResourceFilter {
+            footage_id: query.footage_id,
+            name_contains: query.q,
+            ..ResourceFilter::default()
+        };
+        let (limit, cursor) = (query.limit, query.cursor);
+        let paging = Paging { limit, cursor };
+        Listing { paging, filter }
+    }
+}
+
+impl From<FilmQuery> for Listing {
+    fn from(query: FilmQuery) -> Listing {
+        let filter = ResourceFilter {
+            footage_id: query.footage_id,
+            library_id: query.library_id,
+            name_contains: query.q,
+            ..ResourceFilter::default()
+        };
+        let (limit, cursor) = (query.limit, query.cursor);
+        let paging = Paging { limit, cursor };
+        Listing { paging, filter }
     }
 }
 

@@ -1,14 +1,19 @@
-//! Requests that are the same for footage, libraries, flocks and virtual fish: find, list, get and delete.
+//! Requests that are the same for footage, libraries, flocks and virtual fish: find, list, get and delete. Also
+//! the references to footage and libraries in requests.
 
 use axum::http::StatusCode;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
 use uuid::Uuid;
 
+use super::download::Files;
 use super::extract::Access;
 use super::jobs::absent_result;
-use super::paging::{Page, Paging};
+use super::paging::{Listing, Page};
 use super::problem::{JsonAnswer, Problem};
-use crate::store::resources::Resource;
+use crate::store::BlobFile;
+use crate::store::resources::{Resource, ResourceFilter};
+use flockreel_core::code::Code;
 
 /// The JSON form of a resource.
 pub(super) trait View: Serialize + Sized {
@@ -22,7 +27,71 @@ pub(super) trait View: Serialize + Sized {
     fn id(&self) -> Uuid;
 }
 
+/// The JSON form of the result of a job, which has files.
+pub(super) trait ResultView: View {
+    /// Files that can be downloaded.
+    const FILES: Files;
+
+    /// Returns the folder of the files.
+    fn folder(row: &<Self::Stored as Resource>::Row) -> &str;
+
+    /// Returns the view with its files.
+    fn with_files(self, files: Vec<FileView>) -> Self;
+}
+
+/// A file that can be downloaded from below the address of its resource.
+#[derive(Debug, Serialize, ToSchema)]
+pub(super) struct FileView {
+    /// Name of the file: the last part of its address.
+    name: String,
+    /// Media type.
+    media_type: &'static str,
+    /// Size, bytes.
+    size_bytes: i64,
+}
+
+/// Reference to a resource in a request: its id, or the word `sample` for the newest sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub(super) enum Reference {
+    /// The resource with this id.
+    Id(Uuid),
+    /// The newest resource of its kind that is or derives from the sample of an empty data folder.
+    Sample,
+}
+
+impl TryFrom<String> for Reference {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Reference, String> {
+        match (text.as_str(), text.parse()) {
+            ("sample", _) => Ok(Reference::Sample),
+            (_, Ok(id)) => Ok(Reference::Id(id)),
+            _ => Err(format!("neither an id nor `sample`: {text}")),
+        }
+    }
+}
+
 impl Access {
+    /// Returns the id of a resource. Fails with `invalid_params` if the caller has no sample. An id is returned
+    /// even if no resource has it.
+    pub(super) async fn id_of<R: Resource>(&self, reference: Reference) -> Result<Uuid, Problem> {
+        let filter = match reference {
+            Reference::Id(id) => return Ok(id),
+            Reference::Sample => ResourceFilter {
+                only_sample: true,
+                ..ResourceFilter::default()
+            },
+        };
+        let owners = &self.caller.owners;
+        let newest = (self.store()).filtered_resources::<R>(&filter, 1, None, owners);
+        let newest = newest.await?.into_iter().next();
+        newest.map(|row| R::id(&row)).ok_or_else(|| {
+            let sentence = "this service has no sample, or has not finished it";
+            Problem::new(Code::InvalidParams, sentence)
+        })
+    }
+
     /// Returns the row of a resource. Fails with `not_ready` if its job has not ended, with the code of the
     /// job if that failed or was cancelled, and with `not_found` if there is no such job.
     pub(super) async fn find<R: Resource>(&self, id: Uuid) -> Result<R::Row, Problem> {
@@ -34,11 +103,11 @@ impl Access {
     }
 
     /// Returns a page of resources, newest first.
-    pub(super) async fn list<V: View>(&self, paging: Paging) -> JsonAnswer<Page<V>> {
+    pub(super) async fn list<V: View>(&self, listing: Listing) -> JsonAnswer<Page<V>> {
+        let Listing { paging, filter } = listing;
         let (limit, owners) = (paging.n_rows(), &self.caller.owners);
-        let rows = self
-            .store()
-            .list_resources::<V::Stored>(limit, paging.cursor, owners);
+        let rows =
+            (self.store()).filtered_resources::<V::Stored>(&filter, limit, paging.cursor, owners);
         let views = rows.await?.into_iter().map(V::from_row);
         let views = views.collect::<Result<_, _>>()?;
         Ok(axum::Json(Page::new(views, paging, V::id)))
@@ -48,6 +117,25 @@ impl Access {
     pub(super) async fn get<V: View>(&self, id: Uuid) -> JsonAnswer<V> {
         let row = self.find::<V::Stored>(id).await?;
         Ok(axum::Json(V::from_row(row)?))
+    }
+
+    /// Returns one result with the list of its files.
+    pub(super) async fn get_result<V: ResultView>(&self, id: Uuid) -> JsonAnswer<V> {
+        let row = self.find::<V::Stored>(id).await?;
+        let stored = self.store().files_of(V::folder(&row)).await?;
+        let files = stored.into_iter().filter_map(|file| {
+            let BlobFile {
+                name, size_bytes, ..
+            } = file;
+            let (_, media_type) = V::FILES.iter().find(|(known, _)| *known == name)?;
+            Some(FileView {
+                name,
+                media_type,
+                size_bytes,
+            })
+        });
+        let files = files.collect();
+        Ok(axum::Json(V::from_row(row)?.with_files(files)))
     }
 
     /// Deletes a resource and returns 204. Fails with `not_found` if it was deleted in the meantime.

@@ -5,11 +5,11 @@ use uuid::Uuid;
 
 use super::clock::now_ms;
 use super::masks::Masks;
-use super::{Context, Error};
+use super::{Context, Error, overlay};
 use crate::media::{Limits, ReadOptions, Video, read_image};
-use crate::store::footage::{Added, BACKGROUND, Footage, MASKS, VIDEO};
+use crate::store::footage::{Added, BACKGROUND, Footage, MASKS, POSTER, VIDEO};
 use crate::store::owners::Owner;
-use crate::store::{BlobFile, Draft};
+use crate::store::{BlobFile, Draft, Store};
 use flockreel_core::footage::{FootageFormat, FrameSource};
 
 /// Files received into a draft, synced and hashed, with their label and owner.
@@ -32,23 +32,27 @@ pub struct ReceivedFiles {
 /// files. Waits for a permit of `upload_checks`; fails with [`Error::Busy`] if none becomes free.
 pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, Error> {
     let permit = context.upload_checks.acquire().await?;
-    let (received, format) = tokio::task::spawn_blocking(move || {
+    let store = context.store.clone();
+    let (received, format, poster) = tokio::task::spawn_blocking(move || {
         let _permit = permit;
-        let format = inspect(&received)?;
-        Ok::<_, Error>((received, format))
+        let video = inspect(&received)?;
+        let poster = poster(&store, &video, &received.draft);
+        Ok::<_, Error>((received, video.format(), poster))
     })
     .await
     .unwrap_or(Err(Error::Panicked))?;
-    let footage = footage_row(&received, &format);
+    let mut footage = footage_row(&received, &format);
     let mut files = vec![received.video];
     files.extend(received.background);
     files.extend(received.masks);
+    files.extend(poster);
+    footage.size_bytes = files.iter().map(|file| file.size_bytes).sum();
     let store = &context.store;
     Ok(store.add_footage(footage, received.draft, &files).await?)
 }
 
-/// Checks the files without decoding the video. Returns the properties of the video.
-fn inspect(received: &ReceivedFiles) -> Result<FootageFormat, Error> {
+/// Checks the files without decoding the video. Returns the video.
+fn inspect(received: &ReceivedFiles) -> Result<Video, Error> {
     let limits = Limits::default();
     let path = received.draft.path().join(VIDEO);
     let video = Video::open(&path, &limits)?;
@@ -75,12 +79,21 @@ fn inspect(received: &ReceivedFiles) -> Result<FootageFormat, Error> {
             );
         }
     }
-    Ok(format)
+    Ok(video)
 }
 
+/// Writes the poster into the draft. Footage that cannot be decoded has none: the analysis tells the reason.
+fn poster(store: &Store, video: &Video, draft: &Draft) -> Option<BlobFile> {
+    let written = overlay::write_poster(video, draft.path())
+        .and_then(|()| Ok(store.blobs().seal_one(draft, POSTER)?));
+    written
+        .inspect_err(|error| tracing::info!(%error, "a footage has no poster"))
+        .ok()
+}
+
+/// Returns the row of the footage, without the size of its files.
 fn footage_row(received: &ReceivedFiles, format: &FootageFormat) -> Footage {
     let background = received.background.as_ref();
-    let size_bytes = |file: Option<&BlobFile>| file.map_or(0, |file| file.size_bytes);
     let sha256 = |file: Option<&BlobFile>| file.map_or(Vec::new(), |file| file.sha256.clone());
     let masks = received.masks.as_ref();
     Footage {
@@ -91,7 +104,7 @@ fn footage_row(received: &ReceivedFiles, format: &FootageFormat) -> Footage {
         background_sha256: sha256(background),
         masks_sha256: sha256(masks),
         name: received.name.clone(),
-        size_bytes: received.video.size_bytes + size_bytes(background) + size_bytes(masks),
+        size_bytes: 0,
         width: i64::from(format.width),
         height: i64::from(format.height),
         fps: format.fps,

@@ -2,13 +2,15 @@
 //! "Transitions and playback"). It writes the library folder (docs/reference/formats.md, "library.json") and
 //! the pictures that the web page shows.
 
+use std::path::Path;
+
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::decoding::Counted;
 use super::masks::Masks;
 use super::{Attempt, Error, JobInput, Product, Stages, overlay, refusal};
-use crate::media::{Limits, Notice, ReadOptions, Video, read_image};
+use crate::media::{Encoding, Limits, Notice, ReadOptions, Video, read_image, write_picture};
 use crate::store;
 use crate::store::footage::{BACKGROUND, Footage, MASKS, VIDEO};
 use crate::store::jobs::Kind;
@@ -17,6 +19,7 @@ use flockreel_core::analysis::similarity::distance::{ComparedSprites, Distances,
 use flockreel_core::analysis::{self, Params, analyze};
 use flockreel_core::cpu;
 use flockreel_core::footage::{FrameSource, Part};
+use flockreel_core::formats::atlas::Atlas;
 use flockreel_core::formats::distance_map::DistanceMap;
 use flockreel_core::formats::library_json::FootageSummary;
 use flockreel_core::formats::{csv, library_dir, svg};
@@ -122,12 +125,8 @@ impl JobInput for Input {
         let library = analyze(&film, background, &self.params, level, &scratch, progress)
             .map_err(|cause| refusal::with_picture(source, cause))?;
         self.write(attempt, &library, &footage)?;
-        overlay::film(
-            &Part::new(source, self.params.from_s, self.params.to_s),
-            &library.poses,
-            &attempt.folder().join("overlay.mp4"),
-            progress,
-        )?;
+        let part = Part::new(source, self.params.from_s, self.params.to_s);
+        overlay::write_views(&part, &library.poses, attempt.folder(), progress)?;
         Ok(Product {
             source: Source::Resource(self.footage_id.0),
             params: serde_json::to_string(&self.params)?,
@@ -150,6 +149,7 @@ impl Input {
             std::fs::write(folder.join(name), picture)?;
         }
         library_dir::write_sprites(folder, &library.sprites)?;
+        write_atlas(folder, library)?;
         let map = self.distance_map(attempt, library)?;
         std::fs::write(folder.join("distance.png"), map.draw_distances())?;
         let candidates = map.draw_candidates(library);
@@ -169,6 +169,21 @@ impl Input {
         DistanceMap::compute(&distances, library, attempt.listener)
             .map_err(|_cancelled| Error::Cancelled)
     }
+}
+
+/// Writes `atlas.json` and its pages (docs/reference/formats.md, "Atlas").
+fn write_atlas(folder: &Path, library: &Library) -> Result<(), Error> {
+    let atlas = Atlas::new(library);
+    for (name, page) in atlas.pages(&library.sprites) {
+        let size_px = [page.width, page.height];
+        write_picture(
+            &folder.join(name),
+            size_px,
+            Encoding::StillWebp,
+            &page.pixels,
+        )?;
+    }
+    Ok(std::fs::write(folder.join("atlas.json"), atlas.to_json())?)
 }
 
 impl Summary {

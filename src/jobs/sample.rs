@@ -5,7 +5,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Attempt, Context, Error, IdSequence, JobInput, Product, Stages, analysis, flock};
+use super::{
+    Attempt, Context, Error, IdSequence, JobInput, Product, Stages, analysis, flock, overlay,
+};
 use crate::media::VideoWriter;
 use crate::store;
 use crate::store::footage::{Footage, SampleFootage, VIDEO};
@@ -77,6 +79,7 @@ impl JobInput for Input {
         let written = path.with_extension("mp4");
         write(&film, &written, attempt.listener)?;
         std::fs::rename(&written, &path)?;
+        overlay::write_poster(&film, attempt.folder())?;
         let format = film.format();
         Ok(Product {
             source: Source::Sample(SampleFootage {

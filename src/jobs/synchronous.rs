@@ -4,6 +4,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
@@ -15,20 +16,40 @@ use flockreel_core::analysis::similarity::distance::{
     ComparedSprites, DistanceMatrix, Distances, Side,
 };
 use flockreel_core::cpu::Level;
-use flockreel_core::flock::{Params, plan_flock};
+use flockreel_core::flock::{Flock, Params, plan_flock};
 use flockreel_core::formats::library_dir::{self, StoredLibrary};
-use flockreel_core::formats::{flock_json, npy};
+use flockreel_core::formats::npy;
 use flockreel_core::progress::Progress;
 
-/// Simulates and plans a flock. Returns its `flock.json`.
+/// A planned flock, and the time that each step took.
+#[derive(Clone, Debug)]
+pub struct Preview {
+    /// File of the flock.
+    pub file: Vec<u8>,
+    /// Time of simulation and planning.
+    pub planning: Duration,
+    /// Time of writing the file.
+    pub writing: Duration,
+}
+
+/// Simulates and plans a flock. Its file has the format that `write` makes.
 pub async fn preview_flock(
     context: &Context,
     library: &Library,
     params: Params,
-) -> Result<Vec<u8>, Error> {
+    write: fn(&Flock) -> Vec<u8>,
+) -> Result<Preview, Error> {
     let plan = move |stored: StoredLibrary, _: &Draft, cancellation: &Cancellation| {
+        let start = Instant::now();
         let flock = plan_flock(&stored.library, &params, cancellation)?;
-        Ok(flock_json::write(&flock))
+        let planning = start.elapsed();
+        let file = write(&flock);
+        let writing = start.elapsed() - planning;
+        Ok(Preview {
+            file,
+            planning,
+            writing,
+        })
     };
     compute(context, library, plan).await
 }
@@ -74,17 +95,26 @@ async fn compute<Output: Send + 'static>(
     let draft = store
         .blobs()
         .draft(&format!("synchronous.{}", Uuid::now_v7()))?;
-    let cancellation = Cancellation(CancellationToken::new());
-    let _cancel_on_drop = cancellation.0.clone().drop_guard();
     let threads = context.threads;
-    let output = tokio::task::spawn_blocking(move || {
+    run_until_dropped(move |cancellation| {
         let _permit = permit;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.map_err(std::io::Error::other)?.install(|| {
             let stored = library_dir::read(files.path(), Arc::new(Spill::into(draft.path())))?;
-            work(stored, &draft, &cancellation)
+            work(stored, &draft, cancellation)
         })
-    });
+    })
+    .await
+}
+
+/// Runs `work` on a blocking thread. A blocking thread cannot be stopped, so dropping the future sets the
+/// cancellation that `work` has to look at.
+async fn run_until_dropped<Output: Send + 'static>(
+    work: impl FnOnce(&Cancellation) -> Result<Output, Error> + Send + 'static,
+) -> Result<Output, Error> {
+    let cancellation = Cancellation(CancellationToken::new());
+    let _cancel_on_drop = cancellation.0.clone().drop_guard();
+    let output = tokio::task::spawn_blocking(move || work(&cancellation));
     output.await.unwrap_or(Err(Error::Panicked))
 }
 
@@ -96,5 +126,30 @@ impl Progress for Cancellation {
 
     fn cancelled(&self) -> bool {
         self.0.is_cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc;
+
+    use super::*;
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn dropped_request_stops_its_computation() {
+        let (sender, receiver) = mpsc::channel();
+        let request = tokio::spawn(run_until_dropped(move |cancellation| {
+            sender.send("begun").unwrap();
+            let begun = Instant::now();
+            while !cancellation.cancelled() && begun.elapsed() < Duration::from_secs(20) {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            sender.send("ended").unwrap();
+            Ok(())
+        }));
+        let next = || receiver.recv_timeout(Duration::from_secs(10));
+        assert_eq!(next(), Ok("begun"));
+        request.abort();
+        assert_eq!(next(), Ok("ended"));
     }
 }

@@ -27,7 +27,7 @@ mod tools; // paths of the tools, and the layers in which they run
 mod video; // Video: video files and still pictures
 
 pub use codecs::Codecs;
-pub use encode::{Encoding, Quality, VideoFormat, VideoWriter};
+pub use encode::{Encoding, Quality, VideoFormat, VideoWriter, write_picture};
 pub use error::{Damage, Error};
 pub use image::{decode_image, read_image};
 pub use limits::Limits;

@@ -6,11 +6,13 @@ use sqlx::types::Uuid;
 
 use super::jobs::Lease;
 use super::jobs::finish::Outcome;
-use super::owners::Owner;
+use super::owners::{Owner, OwnerFilter};
 use super::{BlobFile, Draft, Error, Store, Transaction, blobs, sql};
 
 /// File name of the video in its folder.
 pub const VIDEO: &str = "video";
+/// File name of the picture that shows the video, in its folder. Footage of older versions has none.
+pub const POSTER: &str = "poster.jpg";
 /// File name of the given background in its folder.
 pub const BACKGROUND: &str = "background";
 
@@ -34,7 +36,7 @@ pub struct Footage {
     pub masks_sha256: Vec<u8>,
     /// Label given by the user; never used as a path.
     pub name: String,
-    /// Size of video, background and masks, bytes.
+    /// Size of all files, bytes.
     pub size_bytes: i64,
     /// Width in square pixels.
     pub width: i64,
@@ -95,6 +97,22 @@ impl Store {
             }
             Err(error) => self.settle(footage, error.into()).await,
         }
+    }
+
+    /// Changes the label of a footage. Returns false if the footage does not exist.
+    pub async fn rename_footage(
+        &self,
+        id: Uuid,
+        name: &str,
+        owners: &OwnerFilter,
+    ) -> Result<bool, Error> {
+        let sql = "update footage set name = $2 where id = $1 and ($3 is null or owner = $3)";
+        let rename = sql::query(sql).bind(id).bind(name);
+        let rename = rename.bind(owners.parameter());
+        let mut transaction = self.begin().await?;
+        let n_renamed = rename.execute(&mut transaction).await?;
+        transaction.commit().await?;
+        Ok(n_renamed > 0)
     }
 
     /// Decides the outcome after a failed insert. The row may exist nevertheless if only the database's reply
@@ -180,7 +198,7 @@ pub(super) async fn insert_sample(
     .bind(&video.sha256)
     .bind(&b""[..])
     .bind(sample.name)
-    .bind(video.size_bytes)
+    .bind(outcome.size_bytes())
     .bind(i64::from(sample.width))
     .bind(i64::from(sample.height))
     .bind(sample.fps)

@@ -42,21 +42,22 @@ impl Store {
         Ok(row.fetch_optional(&self.reader).await?)
     }
 
-    /// Returns the newest rows with ids less than `before`, at most `limit`.
+    /// Returns the newest rows with ids less than `before`, at most `limit`. `condition` is more SQL for the
+    /// condition, with parameters from `$4` on, which `bind` adds.
     pub(super) async fn newest_visible_rows<T: sql::Row>(
         &self,
         select: &str,
-        limit: i64,
-        before: Option<Uuid>,
+        (limit, before): (i64, Option<Uuid>),
         owners: &OwnerFilter,
+        (condition, bind): (&str, impl FnOnce(sql::Query) -> sql::Query),
     ) -> Result<Vec<T>, Error> {
-        let filter = "where ($1 is null or r.id < $1) and ($3 is null or r.owner = $3) \
-                      order by r.id desc limit $2";
-        let rows = sql::query(format!("{select} {filter}"))
+        let filter = "where ($1 is null or r.id < $1) and ($3 is null or r.owner = $3)";
+        let order = "order by r.id desc limit $2";
+        let rows = sql::query(format!("{select} {filter} {condition} {order}"))
             .bind(before)
             .bind(limit);
         let rows = rows.bind(owners.parameter());
-        Ok(rows.fetch_all(&self.reader).await?)
+        Ok(bind(rows).fetch_all(&self.reader).await?)
     }
 }
 

@@ -8,7 +8,30 @@ use sqlx::types::Uuid;
 
 use super::footage::Footage;
 use super::owners::OwnerFilter;
-use super::{Error, Store};
+use super::{Error, Store, sql};
+
+/// Conditions of a list. A resource must meet all of them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ResourceFilter {
+    /// The footage, or the footage that the resource was made from.
+    pub footage_id: Option<Uuid>,
+    /// The library, or the library that the resource was made from. Not for footage.
+    pub library_id: Option<Uuid>,
+    /// Text that the label of the footage contains, in any case.
+    pub name_contains: Option<String>,
+    /// Whether to leave out all but the sample and what was made from it.
+    pub only_sample: bool,
+}
+
+impl ResourceFilter {
+    /// Returns the pattern of `like` for names, in which `\` escapes the special characters.
+    fn name_pattern(&self) -> Option<String> {
+        let text = self.name_contains.as_ref()?;
+        let escaped = text.replace('\\', "\\\\");
+        let escaped = escaped.replace('%', "\\%").replace('_', "\\_");
+        Some(format!("%{escaped}%"))
+    }
+}
 
 /// Kinds of stored resources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,11 +52,18 @@ pub trait Resource {
     type Row: for<'r> FromRow<'r, SqliteRow> + for<'r> FromRow<'r, PgRow> + Send + Unpin;
     /// The kind.
     const KIND: ResourceKind;
+
+    /// Returns the id of a row.
+    fn id(row: &Self::Row) -> Uuid;
 }
 
 impl Resource for Footage {
     type Row = Footage;
     const KIND: ResourceKind = ResourceKind::Footage;
+
+    fn id(row: &Footage) -> Uuid {
+        row.id
+    }
 }
 
 /// One stored library. Its files are in `folder`.
@@ -64,6 +94,10 @@ pub struct Library {
 impl Resource for Library {
     type Row = Library;
     const KIND: ResourceKind = ResourceKind::Library;
+
+    fn id(row: &Library) -> Uuid {
+        row.id
+    }
 }
 
 /// Flocks. Their rows are [`FilmRow`]s.
@@ -72,6 +106,10 @@ pub struct Flock;
 impl Resource for Flock {
     type Row = FilmRow;
     const KIND: ResourceKind = ResourceKind::Flock;
+
+    fn id(row: &FilmRow) -> Uuid {
+        row.id
+    }
 }
 
 /// Virtual fish. Their rows are [`FilmRow`]s.
@@ -80,6 +118,10 @@ pub struct Fish;
 impl Resource for Fish {
     type Row = FilmRow;
     const KIND: ResourceKind = ResourceKind::Fish;
+
+    fn id(row: &FilmRow) -> Uuid {
+        row.id
+    }
 }
 
 /// One stored flock or virtual fish. Its files are in `folder`.
@@ -93,6 +135,8 @@ pub struct FilmRow {
     pub library_id: Uuid,
     /// Folder in the blob store.
     pub folder: String,
+    /// Label of the footage.
+    pub name: String,
     /// Parameters of the job, JSON.
     pub params: String,
     /// Summary for overviews, JSON.
@@ -124,6 +168,20 @@ impl ResourceKind {
         }
     }
 
+    /// Returns the SQL of a [`ResourceFilter`], with its parameters from `$4` on. `like` is not sensitive to
+    /// case in SQLite only, so both sides are in lower case.
+    fn condition(self) -> String {
+        let [footage_id, library_id, name] = match self {
+            ResourceKind::Footage => ["r.id", "r.id", "r.name"],
+            ResourceKind::Library => ["footage_id", "r.id", "f.name"],
+            ResourceKind::Flock | ResourceKind::Fish => ["footage_id", "library_id", "f.name"],
+        };
+        format!(
+            "and ($4 is null or {footage_id} = $4) and ($5 is null or {library_id} = $5) \
+             and ($6 is null or lower({name}) like lower($6) escape '\\') and (sample or not $7)"
+        )
+    }
+
     /// Returns the statement that selects the rows of all owners. The table has the alias `r`.
     fn select(self) -> String {
         let table = self.plural();
@@ -136,7 +194,7 @@ impl ResourceKind {
                     .to_owned()
             }
             ResourceKind::Flock | ResourceKind::Fish => format!(
-                "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, sample, \
+                "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, f.name, sample, \
                  r.size_bytes, r.created_ms \
                  from {table} r join libraries l on l.id = library_id \
                  join footage f on f.id = footage_id"
@@ -162,8 +220,28 @@ impl Store {
         before: Option<Uuid>,
         owners: &OwnerFilter,
     ) -> Result<Vec<R::Row>, Error> {
-        let select = R::KIND.select();
-        self.newest_visible_rows(&select, limit, before, owners)
+        let all = ResourceFilter::default();
+        self.filtered_resources::<R>(&all, limit, before, owners)
+            .await
+    }
+
+    /// Returns the newest of the resources that pass a filter, with ids less than `before`, at most `limit`.
+    pub async fn filtered_resources<R: Resource>(
+        &self,
+        filter: &ResourceFilter,
+        limit: i64,
+        before: Option<Uuid>,
+        owners: &OwnerFilter,
+    ) -> Result<Vec<R::Row>, Error> {
+        let (select, condition) = (R::KIND.select(), R::KIND.condition());
+        let bind = |query: sql::Query| {
+            query
+                .bind(filter.footage_id)
+                .bind(filter.library_id)
+                .bind(filter.name_pattern().as_deref())
+                .bind(filter.only_sample)
+        };
+        self.newest_visible_rows(&select, (limit, before), owners, (&condition, bind))
             .await
     }
 }

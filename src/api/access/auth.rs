@@ -69,6 +69,7 @@ fn is_open(path: &str) -> bool {
         "/healthz",
         "/readyz",
         "/openapi.json",
+        "/v1/errors",
         "/v1/session",
     ];
     let below = ["/static/", "/vendor/", "/docs/"];

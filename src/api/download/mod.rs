@@ -3,12 +3,15 @@
 //!
 //! Stored files never change, so clients may cache them forever. The ETag is the SHA-256 of the content.
 
+pub(super) mod compression; // gzip and zstd
+pub(super) mod names; // names of saved files
 mod range;
 
 use axum::body::Body;
 use axum::http::{HeaderValue, Method, Response, StatusCode, header};
 use axum::response::IntoResponse;
 
+pub(super) use self::range::matches;
 use self::range::{Wanted, wanted};
 use super::Problem;
 use super::extract::Conditions;

@@ -45,7 +45,7 @@ fn header_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
 }
 
 /// Returns whether a list of tags contains `etag`, by the weak comparison that If-None-Match uses.
-fn matches(tags: &str, etag: &str) -> bool {
+pub(in crate::api) fn matches(tags: &str, etag: &str) -> bool {
     tags.split(',')
         .map(str::trim)
         .any(|tag| tag == "*" || tag.strip_prefix("W/").unwrap_or(tag) == etag)

@@ -12,9 +12,10 @@ use crate::api::receive::{Form, is_film, receive_with_json};
 use crate::jobs::flock::Input;
 use crate::jobs::{IdSequence, analysis};
 use crate::store::footage::Added;
+use crate::store::resources::Library;
 use flockreel_core::flock::Params;
 use flockreel_core::formats::params;
-use flockreel_core::ids::{FootageId, JobId};
+use flockreel_core::ids::{FootageId, JobId, LibraryId};
 
 /// Start making a flock.
 ///
@@ -43,7 +44,8 @@ pub(in crate::api) async fn create_flock(
     }
     let Json(request) = Json::<FlockRequest>::from_request(request, &access.state).await?;
     let params: Params = params::read(request.params)?;
-    let library_id = request.library_id;
+    let library_id = access.id_of::<Library>(request.library_id).await?;
+    let library_id = LibraryId(library_id);
     let after_job = job_to_follow(&access, library_id).await?;
     let input = Input { library_id, params };
     queue(&access, input, after_job, &mut ids).await

@@ -12,19 +12,23 @@ use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::analyses::AnalysisOverrides;
-use super::download::{Download, Files, disposition, find as find_file};
+use super::download::names::{saved_as, stem};
+use super::download::{Download, Files, find as find_file};
 use super::extract::{Access, Conditions, FileOf, Id};
-use super::paging::{Page, Paging};
+use super::paging::{FilmQuery, Filtered, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
-use super::resources::View;
+use super::resources::{FileView, Reference, ResultView, View};
 use super::timestamp::rfc3339;
 use crate::jobs::flock::Summary;
+use crate::store::jobs::JobState;
 use crate::store::resources::{FilmRow, Flock};
 use flockreel_core::flock::Params;
+use flockreel_core::formats::flock_plan;
 use flockreel_core::ids::{FlockId, JobId, LibraryId};
 
 const FILES: Files = &[
     ("flock.json", "application/json"),
+    ("flock.plan", flock_plan::MEDIA_TYPE),
     ("frames.zip", "application/zip"),
     ("ground-truth.zip", "application/zip"),
     ("overlay.mp4", "video/mp4"),
@@ -32,6 +36,7 @@ const FILES: Files = &[
     ("poster.png", "image/png"),
     ("preview.gif", "image/gif"),
     ("preview.webp", "image/webp"),
+    ("thumb.webp", "image/webp"),
     ("tracks.csv", "text/csv; charset=utf-8"),
     ("video.mov", "video/quicktime"),
     ("video.webm", "video/webm"),
@@ -43,9 +48,9 @@ const FILES: Files = &[
 /// The parameters override the values of `preset`, or the defaults if there is no preset.
 #[derive(Debug, Deserialize, ToSchema)]
 pub(super) struct FlockRequest {
-    /// Library to make the flock from.
-    #[schema(value_type = Uuid)]
-    library_id: LibraryId,
+    /// Id of the library to make the flock from, or `sample`: the newest library of the sample.
+    #[schema(value_type = String)]
+    library_id: Reference,
     #[serde(flatten)]
     #[schema(value_type = Params)]
     params: Map<String, Value>,
@@ -108,8 +113,13 @@ pub(super) struct FlockView {
     id: Uuid,
     /// Job that made the flock.
     job_id: Uuid,
+    /// State of the job: always `done`. Before, this address answers 404 with `not_ready`, or with the reason
+    /// why there is no flock.
+    state: &'static str,
     /// Library that the flock was made from.
     library_id: Uuid,
+    /// Name of the footage.
+    name: String,
     /// Whether it was made from the sample of an empty data folder.
     sample: bool,
     /// Size of all files, bytes.
@@ -121,15 +131,21 @@ pub(super) struct FlockView {
     params: Value,
     #[serde(flatten)]
     summary: Summary,
+    /// Files that can be downloaded, by name. Only in the response for one flock.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    files: Option<Vec<FileView>>,
 }
 
 /// List all flocks, newest first.
-#[utoipa::path(get, path = "/v1/flocks", params(Paging), responses(
+#[utoipa::path(get, path = "/v1/flocks", params(FilmQuery), responses(
     (status = 200, body = Page<FlockView>),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn list_flocks(access: Access, paging: Paging) -> JsonAnswer<Page<FlockView>> {
-    access.list(paging).await
+pub(super) async fn list_flocks(
+    access: Access,
+    query: Filtered<FilmQuery>,
+) -> JsonAnswer<Page<FlockView>> {
+    access.list(query.0).await
 }
 
 /// Get one flock: a summary, its parameters and advice.
@@ -141,7 +157,7 @@ pub(super) async fn list_flocks(access: Access, paging: Paging) -> JsonAnswer<Pa
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
 pub(super) async fn get_flock(access: Access, Id(id): Id) -> JsonAnswer<FlockView> {
-    access.get(id).await
+    access.get_result(id).await
 }
 
 /// Delete a flock and its job.
@@ -157,6 +173,8 @@ pub(super) async fn delete_flock(access: Access, Id(id): Id) -> Result<StatusCod
 ///
 /// - `video.mp4`: the film
 /// - `flock.json`: all data of the flock
+/// - `flock.plan`: positions and frames as binary columns, for drawing the flock (docs/reference/formats.md)
+/// - `thumb.webp`: the middle frame, at most 320 pixels wide and 30 KB long
 /// - `plan.svg`: chart of the headings of boids and individuals
 /// - `tracks.csv`, `ground-truth.zip`: the ground truth, unless `render.ground_truth` is false
 /// - `video.webm`, `video.mov`, `frames.zip`, `preview.gif`, `preview.webp`, `poster.png`: if
@@ -178,29 +196,31 @@ pub(super) async fn get_flock_file(
 ) -> Answer {
     let (name, media_type) = find_file(FILES, &name)?;
     let flock = access.find::<Flock>(id).await?;
-    // A browser cannot show these, so it saves them.
-    let kind = match media_type {
-        "application/zip" | "video/quicktime" => "attachment",
-        _ => "inline",
-    };
     let download = Download {
         folder: &flock.folder,
         name,
         media_type,
-        disposition: disposition(kind, &saved_name(name, id)),
+        disposition: saved_as(media_type, &saved_name(&flock, name)?),
     };
     download.answer(access.store(), &conditions).await
 }
 
-/// Returns the name under which a browser saves the file.
-fn saved_name(name: &str, id: Uuid) -> String {
-    match name {
-        "flock.json" => format!("flock-{id}.json"),
-        _ => match name.strip_prefix("video.") {
-            Some(kind) => format!("flock-{id}.{kind}"),
-            None => format!("flock-{id}-{name}"),
-        },
-    }
+/// Returns the name under which a browser saves the file, such as `finch_40x240_s1.mp4` for 40 individuals, 240
+/// frames and the seed 1.
+fn saved_name(flock: &FilmRow, name: &str) -> Result<String, Problem> {
+    let Summary {
+        count,
+        frames,
+        seed,
+        ..
+    } = super::stored(&flock.summary)?;
+    let flock = format!("{}_{count}x{frames}_s{seed}", stem(&flock.name));
+    let main = ["video.", "flock."];
+    let kind = main.iter().find_map(|main| name.strip_prefix(main));
+    Ok(match kind {
+        Some(kind) => format!("{flock}.{kind}"),
+        None => format!("{flock}_{name}"),
+    })
 }
 
 impl View for FlockView {
@@ -214,12 +234,30 @@ impl View for FlockView {
         Ok(FlockView {
             id: row.id,
             job_id: row.job_id,
+            state: JobState::Done.name(),
             library_id: row.library_id,
+            name: row.name,
             sample: row.sample,
             size_bytes: row.size_bytes,
             created_at: rfc3339(row.created_ms),
             params: super::stored(&row.params)?,
             summary: super::stored(&row.summary)?,
+            files: None,
         })
+    }
+}
+
+impl ResultView for FlockView {
+    const FILES: Files = FILES;
+
+    fn folder(row: &FilmRow) -> &str {
+        &row.folder
+    }
+
+    fn with_files(self, files: Vec<FileView>) -> FlockView {
+        FlockView {
+            files: Some(files),
+            ..self
+        }
     }
 }

@@ -3,6 +3,8 @@
 
 pub(super) mod docs; // /docs, /docs/errors
 
+pub(super) mod errors; // /v1/errors
+pub(super) mod examples; // tags and examples of the OpenAPI document
 pub(super) mod openapi; // /openapi.json
 
 use axum::Router;
@@ -13,6 +15,7 @@ use axum::response::IntoResponse;
 use axum::routing::get;
 use rust_embed::{EmbeddedFile, RustEmbed};
 
+use crate::api::download::matches;
 use crate::api::{AppState, Problem};
 use crate::store::blobs::hex;
 
@@ -26,13 +29,29 @@ struct Static;
 #[allow_missing = true]
 struct Vendor;
 
-/// Returns the routes `/`, `/static/` and `/vendor/`.
+/// Addresses of the places of the page. The page itself shows the place of its address.
+const PLACES: [&str; 11] = [
+    "/",
+    "/films",
+    "/films/{id}",
+    "/libraries/{id}",
+    "/libraries/{id}/studio",
+    "/libraries/{id}/fish",
+    "/studio",
+    "/flocks",
+    "/flocks/{id}",
+    "/jobs",
+    "/s/{link}",
+];
+
+/// Returns the routes of the places, `/static/` and `/vendor/`.
 pub(super) fn routes() -> Router<AppState> {
-    Router::new()
-        .route(
-            "/",
-            get(|headers: HeaderMap| async move { answer::<Static>("index.html", &headers) }),
-        )
+    let page = |headers: HeaderMap| async move { answer::<Static>("index.html", &headers) };
+    let places = PLACES.into_iter();
+    places
+        .fold(Router::new(), |routes, place| {
+            routes.route(place, get(page))
+        })
         .route("/static/{*path}", get(get_file::<Static>))
         .route("/vendor/{*path}", get(get_file::<Vendor>))
 }
@@ -59,7 +78,8 @@ pub(super) fn tagged(
     answer: impl FnOnce() -> Response<Body>,
 ) -> Response<Body> {
     let known = headers.get(header::IF_NONE_MATCH);
-    let is_known = known.is_some_and(|tag| tag.as_bytes() == etag.as_bytes());
+    let known = known.and_then(|tags| tags.to_str().ok());
+    let is_known = known.is_some_and(|tags| matches(tags, etag));
     let tags = [
         (header::ETAG, etag.to_owned()),
         (header::CACHE_CONTROL, "no-cache".to_owned()),

@@ -12,6 +12,7 @@ use super::sink::{self, Sink};
 use super::target::{Output, Target};
 use super::truth::TruthFolder;
 use crate::jobs::Error;
+use crate::media::{Encoding, write_picture};
 use flockreel_core::flock::composite::params::{Background, Format};
 use flockreel_core::flock::{Compositor, Flock, Shot};
 use flockreel_core::footage::FrameSource;
@@ -19,6 +20,13 @@ use flockreel_core::formats::ground_truth::FilmShape;
 use flockreel_core::library::Library;
 use flockreel_core::progress::Progress;
 use flockreel_core::raster::RgbImage;
+
+/// Largest small picture, bytes. A list shows many of them.
+const MAX_THUMB_BYTES: u64 = 30_000;
+
+/// Qualities of the small picture, tried in this order. The last is used whatever its size: at 320 pixels it is
+/// below the limit even for noise.
+const THUMB_QUALITIES: [u8; 4] = [80, 60, 30, 5];
 
 /// A flock with everything needed to draw it.
 #[derive(Clone, Copy)]
@@ -149,18 +157,31 @@ impl Film<'_> {
 
     /// Writes the middle frame as a picture.
     fn poster(&self, target: &Target) -> Result<(), Error> {
+        let (size_px, rgba) = self.middle_frame()?;
+        Ok(sink::poster(&target.path, size_px, self.is_clear(), &rgba)?)
+    }
+
+    /// Writes the middle frame as a small WebP for lists, at most [`MAX_THUMB_BYTES`] long.
+    pub fn thumb(&self, path: &Path) -> Result<(), Error> {
+        let (size_px, rgba) = self.middle_frame()?;
+        for quality in THUMB_QUALITIES {
+            write_picture(path, size_px, Encoding::Thumb(quality), &rgba)?;
+            if std::fs::metadata(path)?.len() <= MAX_THUMB_BYTES {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns width and height, pixels, and the middle frame as RGBA with straight alpha.
+    fn middle_frame(&self) -> Result<([u32; 2], Vec<u8>), Error> {
         let compositor = self.with_backdrop(Compositor::new(self.library, self.flock).straight());
         let (mut shot, middle) = (Shot::default(), compositor.n_frames() / 2);
         if let Some(mut video) = self.background_video()? {
             video.draw(middle, &mut shot)?;
         }
         compositor.render(middle, &mut shot);
-        Ok(sink::poster(
-            &target.path,
-            compositor.size_px(),
-            self.is_clear(),
-            &shot.rgba,
-        )?)
+        Ok((compositor.size_px(), shot.rgba))
     }
 
     fn with_backdrop<'a>(&self, compositor: Compositor<'a>) -> Compositor<'a> {

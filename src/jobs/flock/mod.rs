@@ -1,6 +1,6 @@
 //! The flock job: makes a flock from a library (docs/explanation/algorithms.md, "Planning", "Boids" and
-//! "Compositing"). It writes `flock.json`, `plan.svg`, `video.mp4`, and the further files that the `render`
-//! parameters request.
+//! "Compositing"). It writes `flock.json`, `flock.plan`, `plan.svg`, `video.mp4`, `thumb.webp`, and the further files that
+//! the `render` parameters request.
 
 mod background_video;
 pub mod film; // flock -> files
@@ -24,7 +24,7 @@ use crate::store::jobs::Kind;
 use crate::store::jobs::finish::Source;
 use flockreel_core::flock::composite::params::{Format, Render};
 use flockreel_core::flock::{self, Flock, Params, plan_flock};
-use flockreel_core::formats::{flock_json, svg};
+use flockreel_core::formats::{flock_json, flock_plan, svg};
 use flockreel_core::ids::{FlockId, LibraryId};
 use flockreel_core::library::Library;
 
@@ -75,6 +75,7 @@ impl JobInput for Input {
         let mut file = BufWriter::new(File::create(folder.join("flock.json"))?);
         flock_json::write_to(&flock, &mut file)?;
         file.flush()?;
+        std::fs::write(folder.join("flock.plan"), flock_plan::write(&flock))?;
         std::fs::write(folder.join("plan.svg"), svg::plan(&flock))?;
         render(attempt, &library, &flock)?;
         let summary = Summary {
@@ -105,6 +106,7 @@ fn render(attempt: &Attempt, library: &Library, flock: &Flock) -> Result<(), Err
         progress: attempt.listener,
     };
     let truth = folder.join("ground-truth");
+    film.thumb(&folder.join("thumb.webp"))?;
     let targets = targets(folder, &flock.params.render);
     if !flock.params.render.ground_truth {
         return film.make(&targets, None);

@@ -25,6 +25,15 @@ pub enum Encoding {
     },
     /// Animated WebP, at most 480 pixels wide and 15 frames per second, from RGBA.
     Webp,
+    /// Still WebP, from RGBA with straight alpha.
+    StillWebp,
+    /// Still WebP, at most 320 pixels wide, from RGBA with straight alpha. Quality 0..=100.
+    Thumb(u8),
+    /// H.264 in MP4 for players that seek to every frame, from planar frames: at most 960 pixels wide, a key
+    /// frame every 10 frames.
+    Seekable,
+    /// JPEG, from planar frames.
+    Jpeg,
     /// Animated GIF, at most 480 pixels wide and 15 frames per second, from planar frames.
     Gif,
 }
@@ -32,12 +41,15 @@ pub enum Encoding {
 impl Encoding {
     /// Returns whether frames are RGBA, not planar.
     pub fn takes_rgba(self) -> bool {
-        !matches!(self, Encoding::H264(_) | Encoding::Gif)
+        !matches!(
+            self,
+            Encoding::H264(_) | Encoding::Seekable | Encoding::Jpeg | Encoding::Gif
+        )
     }
 
     /// Returns whether width and height must be even.
     pub(super) fn is_even(self) -> bool {
-        matches!(self, Encoding::H264(_))
+        matches!(self, Encoding::H264(_) | Encoding::Seekable)
     }
 
     /// Returns all arguments of ffmpeg. The output file is last.
@@ -99,6 +111,19 @@ impl Encoding {
             Encoding::Webp => format!(
                 "-vf {SMALL} -c:v libwebp_anim -quality 75 -compression_level 3 -loop 0 -f webp"
             ),
+            Encoding::StillWebp => {
+                "-c:v libwebp -pix_fmt yuva420p -quality 82 -compression_level 4 -f webp".to_owned()
+            }
+            Encoding::Thumb(quality) => format!(
+                "-vf scale=w='min(320,iw)':h=-1:flags=area -c:v libwebp -pix_fmt yuva420p \
+                 -quality {quality} -compression_level 4 -f webp"
+            ),
+            Encoding::Seekable => seekable(format),
+            Encoding::Jpeg => {
+                "-vf scale=w='min(640,iw)':h=-2:out_range=pc,format=yuvj420p -c:v mjpeg -q:v 4 \
+                 -frames:v 1 -f mjpeg"
+                    .to_owned()
+            }
             Encoding::Gif => format!(
                 "-vf {SMALL},split[a][b];[a]palettegen=stats_mode=full[p];\
                  [b][p]paletteuse=dither=bayer:bayer_scale=4 -c:v gif -loop 0 -f gif"
@@ -119,7 +144,8 @@ fn from_rgba(planes: &str) -> String {
     )
 }
 
-fn h264(format: &VideoFormat, quality: Quality) -> String {
+/// Returns the color tags of planar frames, as a filter.
+fn tags(format: &VideoFormat) -> String {
     let range = match format.color.range {
         Range::Limited => "tv",
         Range::Full => "pc",
@@ -128,16 +154,32 @@ fn h264(format: &VideoFormat, quality: Quality) -> String {
         Matrix::Bt601 => "smpte170m",
         Matrix::Bt709 => "bt709",
     };
+    // The RGB values are sRGB whatever the luma weights, so the primaries are those of BT.709.
+    format!("setparams=range={range}:colorspace={matrix}:color_primaries=bt709:color_trc=bt709")
+}
+
+/// Returns the settings of H.264 for seeking: `-g` sets the distance of key frames, and without B-frames each
+/// frame is shown as soon as it is decoded.
+fn seekable(format: &VideoFormat) -> String {
+    format!(
+        "-vf {},scale=w='min(960,iw)':h=-2:flags=area -c:v libx264 -preset veryfast -profile:v high -crf 24 \
+         -g 10 -bf 0 -threads 4 -x264-params cpu-independent=1 -bsf:v filter_units=remove_types=6 \
+         -movflags +faststart -f mp4",
+        tags(format)
+    )
+}
+
+fn h264(format: &VideoFormat, quality: Quality) -> String {
     let Quality { crf, threads } = quality;
-    // The RGB values are sRGB whatever the luma weights, so the primaries are those of BT.709. The bitstream
+    // The bitstream
     // filter removes the message in which x264 writes its version and settings. `subme` and `me` are set
     // below the preset, because most of a video is background. A better motion search saves 5 to 9 % of size
     // there, for a quarter of the time (docs/measurements.md).
     format!(
-        "-vf setparams=range={range}:colorspace={matrix}:color_primaries=bt709:color_trc=bt709 \
-         -c:v libx264 -preset veryfast -profile:v high -crf {crf} -threads {threads} \
+        "-vf {} -c:v libx264 -preset veryfast -profile:v high -crf {crf} -threads {threads} \
          -x264-params cpu-independent=1:subme=1:me=dia -bsf:v filter_units=remove_types=6 \
-         -movflags +faststart -f mp4"
+         -movflags +faststart -f mp4",
+        tags(format)
     )
 }
 

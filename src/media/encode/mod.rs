@@ -180,6 +180,24 @@ impl VideoWriter {
     }
 }
 
+/// Writes one RGBA picture with straight alpha, row by row, in the format of an encoding.
+pub fn write_picture(
+    path: &Path,
+    [width, height]: [u32; 2],
+    encoding: Encoding,
+    rgba: &[u8],
+) -> Result<(), Error> {
+    let format = VideoFormat {
+        width,
+        height,
+        fps: 1.0,
+        color: ColorSpec::default(),
+    };
+    let mut writer = VideoWriter::create_as(path, &format, encoding)?;
+    writer.write_rgba(rgba)?;
+    writer.finish()
+}
+
 /// The file under its temporary name. Dropping it deletes the file, unless it was renamed.
 struct PartFile(PathBuf);
 

@@ -124,6 +124,11 @@ impl Blobs {
             .collect()
     }
 
+    /// Syncs and hashes one file of a draft. Blocks the thread.
+    pub fn seal_one(&self, draft: &Draft, name: &str) -> io::Result<BlobFile> {
+        seal_file(&draft.path().join(name))
+    }
+
     /// Stores a draft as `folder`. Its files must be synced.
     pub async fn adopt(&self, draft: Draft, folder: &str) -> Result<(), Error> {
         match &self.backend {
@@ -226,6 +231,13 @@ impl Store {
         let sql = "select name, size_bytes, sha256 from blobs where folder = $1 and name = $2";
         let blob = sql::query(sql).bind(folder).bind(name);
         Ok(blob.fetch_optional(&self.reader).await?)
+    }
+
+    /// Returns the files of a folder in the order of their names.
+    pub async fn files_of(&self, folder: &str) -> Result<Vec<BlobFile>, Error> {
+        let sql = "select name, size_bytes, sha256 from blobs where folder = $1 order by name";
+        let files = sql::query(sql).bind(folder);
+        Ok(files.fetch_all(&self.reader).await?)
     }
 
     /// Returns local copies of those files of a folder that exist. If the store is local, returns the stored

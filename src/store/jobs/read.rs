@@ -107,7 +107,7 @@ impl Store {
         before: Option<Uuid>,
         owners: &OwnerFilter,
     ) -> Result<Vec<JobRow>, Error> {
-        self.newest_visible_rows(SELECT, limit, before, owners)
+        self.newest_visible_rows(SELECT, (limit, before), owners, ("", |query| query))
             .await
     }
 }

@@ -1,6 +1,7 @@
 //! The API, tested through the real router over TCP. Most files test one noun of the API.
 
 mod auth;
+mod compression;
 mod contract;
 mod corpus;
 mod deletes;
@@ -11,11 +12,13 @@ mod footage;
 mod idempotency;
 mod jobs;
 mod limits;
+mod lists;
 mod metrics;
 mod names;
 mod one_call;
 mod owners;
 mod parameters;
+mod pictures;
 mod synchronous;
 mod uploads;
 mod wait;

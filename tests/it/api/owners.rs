@@ -3,10 +3,6 @@
 //! an operation is missing from its table.
 
 use flockreel::api::signed;
-use flockreel::jobs::Product;
-use flockreel::jobs::worker::{Step, Worker};
-use flockreel::store::jobs::Kind;
-use flockreel::store::jobs::finish::Source;
 use flockreel::store::tokens::Scope;
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
@@ -15,6 +11,7 @@ use uuid::Uuid;
 use crate::common::TestApp;
 use crate::common::app::{json_of, routes};
 use crate::common::clip::TINY;
+use crate::common::results::{Results, id_in};
 
 /// How an operation accesses owned objects.
 enum Touch {
@@ -35,6 +32,8 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("GET", "/v1/footage", List),
         ("GET", "/v1/footage/{id}", Path("footage")),
         ("GET", "/v1/footage/{id}/file", Path("footage")),
+        ("GET", "/v1/footage/{id}/poster.jpg", Path("footage")),
+        ("PATCH", "/v1/footage/{id}", Path("footage")),
         ("GET", "/v1/libraries", List),
         ("GET", "/v1/libraries/{id}", Path("libraries")),
         ("GET", "/v1/libraries/{id}/{file}", Path("libraries")),
@@ -69,6 +68,7 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("POST", "/v1/footage", Nothing),
         ("POST", "/v1/uploads", Nothing),
         ("OPTIONS", "/v1/uploads", Nothing),
+        ("GET", "/v1/errors", Nothing),
         ("POST", "/v1/session", Nothing),
         ("DELETE", "/v1/session", Nothing),
         ("GET", "/healthz", Nothing),
@@ -88,64 +88,19 @@ fn file_of(kind: &str) -> &'static str {
 
 /// Creates one object of every kind for the signed-in owner, with substitute results. Returns kinds and ids.
 async fn belongings(app: &TestApp) -> Vec<(&'static str, String)> {
-    let footage = app.upload(&TINY).await;
-    let analysis = app
-        .accept("/v1/analyses", json!({"footage_id": footage}))
-        .await;
-    let of_library = json!({"library_id": analysis["library_id"]});
-    let flock = app.accept("/v1/flocks", of_library.clone()).await;
-    let fish = app.accept("/v1/fish", of_library).await;
-    let id = |value: &Value| value.as_str().unwrap().to_owned();
-    let (footage_id, library): (Uuid, Uuid) = (
-        footage.parse().unwrap(),
-        id(&analysis["library_id"]).parse().unwrap(),
-    );
-    let worker = Worker::new(app.context.clone());
-    for _ in 0..3 {
-        let step = worker.step_by(move |lease, attempt| {
-            let (source_id, name, summary) = match lease.kind {
-                Kind::Analysis => (footage_id, "library.json", library_summary()),
-                Kind::Flock => (library, "flock.json", flock_summary()),
-                Kind::Fish => (library, "video.mp4", fish_summary()),
-                Kind::Sample => unreachable!("a request queues no sample"),
-            };
-            std::fs::write(attempt.folder().join(name), b"{}")?;
-            Ok(Product {
-                source: Source::Resource(source_id),
-                params: "{}".to_owned(),
-                summary: summary.to_string(),
-            })
-        });
-        assert!(matches!(step.await.unwrap(), Step::Done(_)));
-    }
+    let results = Results::make(app, "film.mp4").await;
     let upload = (app.post("/v1/uploads").header("tus-resumable", "1.0.0"))
         .header("upload-length", 9)
         .send();
-    let upload = upload.await.unwrap().headers()["location"]
-        .to_str()
-        .unwrap()
-        .replace("/v1/uploads/", "");
+    let upload = upload.await.unwrap().headers()["location"].clone();
     vec![
-        ("uploads", upload),
-        ("footage", footage),
-        ("libraries", id(&analysis["library_id"])),
-        ("flocks", id(&flock["flock_id"])),
-        ("fish", id(&fish["fish_id"])),
-        ("jobs", id(&analysis["job_id"])),
+        ("uploads", id_in(upload.to_str().unwrap())),
+        ("footage", id_in(&results.footage)),
+        ("libraries", id_in(&results.library)),
+        ("flocks", id_in(&results.flock)),
+        ("fish", id_in(&results.fish)),
+        ("jobs", id_in(&results.analysis_job)),
     ]
-}
-
-fn library_summary() -> Value {
-    json!({"fps": 25.0, "image_size_px": [64, 64], "view": "side", "n_frames": 10, "detected_share": 1.0,
-        "n_transitions": 1, "component_share": 1.0, "clip_frames": 4, "length_px": null})
-}
-
-fn flock_summary() -> Value {
-    json!({"fps": 25.0, "image_size_px": [64, 64], "count": 1, "frames": 10, "seed": 1})
-}
-
-fn fish_summary() -> Value {
-    json!({"fps": 25.0, "image_size_px": [64, 64], "frames": 10, "visible_frames": 10})
 }
 
 /// Calls an operation with an id. Returns the status, and the body with the id replaced by `ID`.
@@ -161,6 +116,7 @@ async fn response_of(
     let request = match touch {
         Touch::Body(name, _) => request.json(&json!({ *name: id })),
         Touch::Path(_) if method == "POST" => request.json(&json!({})),
+        Touch::Path("footage") if method == "PATCH" => request.json(&json!({"name": "x.mp4"})),
         _ => request,
     };
     let request = match kind {

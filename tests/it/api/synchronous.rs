@@ -1,5 +1,7 @@
 //! Results that are computed during the request: the preview of a flock, and the distances of a library.
 
+use std::time::Duration;
+
 use reqwest::StatusCode;
 use serde_json::json;
 
@@ -41,6 +43,32 @@ async fn preview_equals_the_flock_and_stores_nothing() {
         made["flock_id"].as_str().unwrap()
     );
     assert_eq!(app.json(&path).await["individuals"], preview["individuals"]);
+    app.assert_sound().await;
+}
+
+/// Returns the value of a metric of Server-Timing, milliseconds.
+fn duration_ms(answer: &reqwest::Response, metric: &str) -> f64 {
+    let timing = answer.headers()["server-timing"].to_str().unwrap();
+    let mut metrics = timing.split(", ");
+    let prefix = format!("{metric};dur=");
+    let value = metrics.find_map(|one| one.strip_prefix(&prefix));
+    value.unwrap_or_else(|| panic!("{timing}")).parse().unwrap()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn preview_tells_its_time_and_ends_with_its_client() {
+    let (app, _, library_id) = with_library().await;
+    let request = json!({"library_id": library_id, "count": 200, "frames": 1000});
+    let ask = || app.post("/v1/flocks/preview").json(&request).send();
+    let plan_ms = duration_ms(&ask().await.unwrap(), "plan");
+    assert!(plan_ms > 1.0, "{plan_ms}");
+    let impatient = tokio::time::timeout(Duration::from_secs_f64(plan_ms / 10_000.0), ask());
+    assert!(impatient.await.is_err(), "the client should have gone");
+    // The next preview waits until the planner of the former has stopped.
+    let request = json!({"library_id": library_id, "count": 2, "frames": 10});
+    let next = app.post("/v1/flocks/preview").json(&request).send().await;
+    let waited_ms = duration_ms(&next.unwrap(), "load");
+    assert!(waited_ms < plan_ms / 2.0, "{waited_ms} of {plan_ms} ms");
     app.assert_sound().await;
 }
 

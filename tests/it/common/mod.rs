@@ -6,6 +6,7 @@ pub(crate) mod film;
 pub(crate) mod pictures;
 pub(crate) mod place;
 pub(crate) mod process;
+pub(crate) mod results;
 
 pub(crate) use app::TestApp;
 pub(crate) use place::Place;

@@ -79,6 +79,7 @@ async fn assert_files(app: &TestApp, flock: &str) {
         ("preview.gif", "image/gif", 0, b"GIF89a"),
         ("preview.webp", "image/webp", 8, b"WEBP"),
         ("poster.png", "image/png", 0, b"\x89PNG"),
+        ("thumb.webp", "image/webp", 8, b"WEBP"),
         (
             "tracks.csv",
             "text/csv; charset=utf-8",
@@ -91,6 +92,11 @@ async fn assert_files(app: &TestApp, flock: &str) {
         assert_eq!(answer.headers()["content-type"], media_type, "{file}");
         let bytes = answer.bytes().await.unwrap();
         assert!(bytes[at..].starts_with(magic), "{file}");
+        assert!(
+            file != "thumb.webp" || bytes.len() <= 30_000,
+            "{}",
+            bytes.len()
+        );
     }
     let answer = app.get(&format!("{flock}/ground-truth.zip")).send().await;
     let bytes = answer.unwrap().bytes().await.unwrap();

@@ -92,6 +92,8 @@ async fn a_sample_that_is_filmed_twice_is_one_footage() {
         .send()
         .await;
     assert_eq!(&file.unwrap().bytes().await.unwrap()[4..8], b"ftyp");
+    let poster = app.get(&format!("/v1/footage/{footage_id}/poster.jpg"));
+    assert_eq!(poster.send().await.unwrap().status(), 200);
     assert_eq!(app.n_folders("footage").await, 1);
     app.assert_sound().await;
 }

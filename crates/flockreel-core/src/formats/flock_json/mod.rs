@@ -51,6 +51,12 @@ pub fn write_to(flock: &Flock, out: &mut impl Write) -> io::Result<()> {
     out.write_all(b"\n]}\n")
 }
 
+/// Returns `stats` of flock.json.
+pub(super) fn stats(flock: &Flock) -> serde_json::Value {
+    let file = StatsFile::new(flock.stats, &flock.orders);
+    serde_json::to_value(file).expect("plain values serialise")
+}
+
 /// Parses the output of `write`.
 pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
     let file: FlockFile<Vec<IndividualFile>> = serde_json::from_slice(bytes)?;
