@@ -1,11 +1,12 @@
 #!/bin/sh
-# Runs the tests written in Python. Each kind has a virtual environment with pinned packages below target/.
-# Fails with a reason if a requirement cannot be installed. FLOCKREEL_SKIP="page contract truth" skips the
-# named kinds.
+# Runs the tests written in Python, and those of the page's modules in node. Each kind has a virtual
+# environment with pinned packages below target/. Fails with a reason if a requirement cannot be installed.
+# FLOCKREEL_SKIP="page contract truth" skips the named kinds.
 #
 #   scripts/python-tests.sh KIND PROGRAM     PROGRAM: the flockreel program to test; KIND:
 #       truth       tests/truth: reads the ground truth of a flock with pycocotools and TrackEval
-#       page        tests/page: tests the page of a running service in Debian's chromium
+#       page        tests/page-js: tests the page's modules in node; tests/page: tests the page of a running
+#                   service in Debian's chromium
 #       contract    tests/contract: runs schemathesis on the OpenAPI document of a running service; no
 #                   response has a 5xx status or is undocumented (docs/explanation/promises.md, "Contract")
 set -eu
@@ -34,6 +35,14 @@ export FLOCKREEL_PROGRAM="$program"
 case $kind in
 contract) set -- tests/contract/run.py "$program" ;;
 truth) set -- -m pytest -q -p no:cacheprovider -W ignore::DeprecationWarning tests/truth ;;
-*) set -- -m pytest -q -p no:cacheprovider "tests/$kind" ;;
+page)
+    # `make vendor` installs node from a wheel if the machine has none.
+    PATH=$PATH:$PWD/target/node-venv/bin
+    command -v node >/dev/null || missing "node could not be had"
+    node --test tests/page-js/*.test.mjs
+    # CI leaves out the tests marked as thorough, to stay within half an hour.
+    set -- -m pytest -q -p no:cacheprovider --show-capture=no tests/page ${CI:+-m "not thorough"}
+    ;;
+*) missing "no tests have this name" ;;
 esac
 exec "$venv/bin/python" -B "$@"

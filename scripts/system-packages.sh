@@ -27,6 +27,7 @@ scale-test openssl  openssl
 truth-test python3  python3-venv
 truth-test ffmpeg   ffmpeg
 page-test python3   python3-venv
+page-test ffmpeg    ffmpeg
 contract-test python3 python3-venv
 contract-test ffmpeg  ffmpeg
 bench     wrk       wrk

@@ -9,7 +9,7 @@ if (!outdir) {
 }
 
 await build({
-  entryPoints: { uplot: "libraries/uplot.js" },
+  entryPoints: { uplot: "libraries/uplot.js", tus: "libraries/tus.js" },
   outdir,
   bundle: true,
   minify: true,

@@ -109,6 +109,9 @@ class Walk:
         part = self.call("GET /v1/footage/{id}/file", {"id": ids["footage"]}, headers={"Range": "bytes=0-9"})
         assert part.status_code == 206 and part.content == self.film[:10]
         self.call("GET /v1/footage/{id}", {"id": ids["footage"]})
+        self.call("GET /v1/footage/{id}/poster.jpg", {"id": ids["footage"]})
+        self.call("PATCH /v1/footage/{id}", {"id": ids["footage"]}, body={"name": "finch.mp4"})
+        self.call("GET /v1/errors")
         self.call("GET /v1/jobs/{id}/events", {"id": ids["job"]})
         self.call("POST /v1/flocks/{id}/links", {"id": ids["flock"]}, body={"file": "video.mp4"})
 

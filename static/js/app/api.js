@@ -1,0 +1,69 @@
+// The requests of the page. Every error response becomes a Problem.
+// @ts-check
+import { say } from "./words.js";
+
+/** An error as a problem document of the service (RFC 9457). */
+export class Problem extends Error {
+  /** @param {{title?: string, detail?: string, code?: string, advice?: string, picture?: string | null, status?: number}} body */
+  constructor(body) {
+    super(body.title ?? say("problem.title"));
+    this.title = this.message;
+    this.detail = body.detail ?? "";
+    this.code = body.code ?? "";
+    this.advice = body.advice ?? "";
+    this.picture = body.picture ?? null;
+    this.status = body.status ?? 0;
+  }
+}
+
+export const unreachable = () => new Problem({ title: say("problem.unreachable"), detail: say("problem.unreachable.detail") });
+
+/** @param {string} text @param {number} status */
+export function problemFrom(text, status) {
+  if (status === 401) dispatchEvent(new Event("signed-out"));
+  try {
+    return new Problem({ status, ...JSON.parse(text) });
+  } catch {
+    return new Problem({ status, title: say("problem.status", { status }), detail: text.slice(0, 200) });
+  }
+}
+
+/**
+ * Sends a request and returns the response, or throws a Problem.
+ * @param {string} method @param {string} path
+ * @param {{body?: unknown, accept?: string, signal?: AbortSignal, headers?: Record<string, string>}} [options] the body is sent as JSON
+ */
+export async function request(method, path, { body, accept, signal, headers = {} } = {}) {
+  if (body !== undefined) headers = { "Content-Type": "application/json", ...headers };
+  if (accept) headers = { Accept: accept, ...headers };
+  const response = await fetch(path, { method, headers, signal, body: body === undefined ? undefined : JSON.stringify(body) })
+    .catch((error) => { throw error.name === "AbortError" ? error : unreachable(); });
+  if (!response.ok) throw problemFrom(await response.text(), response.status);
+  return response;
+}
+
+/** @param {string} method @param {string} path @param {any} [options] @returns {Promise<any>} the JSON of the response; null if it has none */
+async function call(method, path, options) {
+  const text = await (await request(method, path, options)).text();
+  return text ? JSON.parse(text) : null;
+}
+
+/** @param {string} path @param {AbortSignal} [signal] */
+export const get = (path, signal) => call("GET", path, { signal });
+/** @param {string} path @param {unknown} [body] @param {AbortSignal} [signal] */
+export const post = (path, body, signal) => call("POST", path, { body, signal });
+/** @param {string} path @param {unknown} body */
+export const patch = (path, body) => call("PATCH", path, { body });
+/** @param {string} path */
+export const remove = (path) => call("DELETE", path);
+
+/**
+ * Returns the items of a list, newest first, and the address of the next page.
+ * @param {string} path @param {AbortSignal} [signal] @returns {Promise<{items: any[], next: string | null}>}
+ */
+export async function list(path, signal) {
+  const page = await get(path, signal);
+  const url = new URL(path, location.origin);
+  url.searchParams.set("cursor", page.next_cursor);
+  return { items: page.items, next: page.next_cursor && url.pathname + url.search };
+}

@@ -1,0 +1,43 @@
+// Builds elements without HTML strings, so that text from file names is never parsed as markup.
+// @ts-check
+
+/**
+ * Returns an element with properties and children.
+ * @param {string} selector a tag with optional id and classes, such as "button.quiet#make"
+ * @param {Record<string, any>} [props] properties; names with a dash and `role` become attributes, names that
+ *   begin with "on" become listeners, and an undefined or null value is left out
+ * @param {...(Node | string | null | undefined | false)} children falsy ones are left out
+ * @returns {any}
+ */
+export function element(selector, props = {}, ...children) {
+  const [tag, ...marks] = selector.split(/(?=[.#])/);
+  const node = document.createElement(tag);
+  for (const mark of marks) {
+    if (mark[0] === "#") node.id = mark.slice(1);
+    else node.classList.add(mark.slice(1));
+  }
+  for (const [name, value] of Object.entries(props)) {
+    if (value === undefined || value === null) continue;
+    if (name.startsWith("on") && typeof value === "function") node.addEventListener(name.slice(2), value);
+    else if (name.includes("-") || name === "role") node.setAttribute(name, String(value));
+    else node[name] = value;
+  }
+  node.append(.../** @type {(Node | string)[]} */ (children.filter((child) => child || child === "")));
+  return node;
+}
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/**
+ * Returns an SVG element. @param {string} tag @param {Record<string, any>} [attributes] @param {...Node} children
+ * @returns {any}
+ */
+export function svg(tag, attributes = {}, ...children) {
+  const node = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) node.setAttribute(name, String(value));
+  node.append(...children);
+  return node;
+}
+
+/** @param {string} id @returns {any} */
+export const byId = (id) => document.getElementById(id);

@@ -1,0 +1,70 @@
+// Names of films, for jobs and flocks that only know an id.
+// @ts-check
+import { get, list } from "./api.js";
+import { jobs, resultOf } from "./jobs.js";
+import { say } from "./words.js";
+
+/** @type {Map<string, Promise<any>>} */
+const known = new Map();
+
+/** Returns a footage, library or flock; asks the service once. @param {"footage" | "libraries" | "flocks"} kind @param {string} id */
+export function thing(kind, id) {
+  const path = `/v1/${kind}/${id}`;
+  if (!known.has(path)) {
+    const asked = get(path);
+    asked.catch(() => known.delete(path));
+    known.set(path, asked);
+  }
+  return /** @type {Promise<any>} */ (known.get(path));
+}
+
+/** Forgets a thing whose name changed. @param {string} kind @param {string} id */
+export const forget = (kind, id) => known.delete(`/v1/${kind}/${id}`);
+
+/** Keeps the things of a list, so that they need not be asked for one by one. @param {string} kind @param {any[]} items */
+export function remember(kind, items) {
+  for (const item of items) known.set(`/v1/${kind}/${item.id}`, Promise.resolve(item));
+}
+
+/** Returns the name of a film as a person would write it, or "film". @param {any} one footage or library */
+export function filmName(one) {
+  if (one?.sample) return say("film.sample");
+  return (one?.name || "").replace(/\.[a-z0-9]{2,5}$/i, "").replaceAll("_", " ").trim() || say("film.unnamed");
+}
+
+/** Lists under way, by kind. @type {Map<string, Promise<{next: string | null}>>} */
+const listing = new Map();
+
+/**
+ * Returns a thing that may be deleted: the list of its kind tells whether it exists, so that nothing missing
+ * is asked for. @param {"footage" | "libraries"} kind @param {string} id @returns {Promise<any>} null if it is gone
+ */
+async function existing(kind, id) {
+  const path = `/v1/${kind}/${id}`;
+  if (!known.has(path)) {
+    const asked = listing.get(kind) ?? list(`/v1/${kind}?limit=100`).then((page) => { remember(kind, page.items); return page; });
+    listing.set(kind, asked);
+    const { next } = await asked.finally(() => setTimeout(() => listing.delete(kind), 1000));
+    if (!known.has(path) && !next) return null;
+  }
+  return thing(kind, id).catch(() => null);
+}
+
+/**
+ * Returns the film that a job works on: its name, the address of a picture if there is one, and
+ * whether it was deleted or never made.
+ * @param {any} job @returns {Promise<{name: string, poster: string, isGone: boolean}>}
+ */
+export async function subjectOf(job) {
+  if (!job.subject) return { name: say("film.sample"), poster: "", isGone: false };
+  // What a job works on does not exist before the job that makes it is done.
+  const maker = jobs.value.find((other) => other.id !== job.id && resultOf(other) === job.subject.id);
+  if (maker && maker.state !== "done") return { name: (await subjectOf(maker)).name, poster: "", isGone: true };
+  const kind = job.subject.kind === "footage" ? "footage" : "libraries";
+  const one = await existing(kind, job.subject.id).catch(() => null);
+  const libraryId = kind === "libraries" ? job.subject.id : job.kind === "analysis" && job.state === "done" && await existing("libraries", resultOf(job)).then((library) => library?.id, () => "");
+  return { name: one ? filmName(one) : say("film.deleted"), poster: one && libraryId ? `/v1/libraries/${libraryId}/poster.jpg` : "", isGone: !one };
+}
+
+/** Returns the library of a flock, null if it was deleted. @param {any} flock */
+export const libraryOf = (flock) => existing("libraries", flock.library_id).catch(() => null);

@@ -1,0 +1,116 @@
+// Places and their addresses. Links inside the page change the place without loading the page again.
+// @ts-check
+import { unreachable } from "./api.js";
+import { byId, element } from "./element.js";
+import { showProblem } from "../parts/problem.js";
+import { say } from "./words.js";
+
+/**
+ * @typedef {{id: string, query: URLSearchParams, life: AbortSignal, state: any}} Visit id of the address, its
+ *   query, and a signal that is aborted when the person leaves the place
+ * @typedef {{show: (root: HTMLElement, visit: Visit) => Promise<void> | void}} Place
+ */
+
+/** Patterns of addresses with the module of their place, and the part of the navigation they belong to. */
+const ROUTES = [
+  { pattern: /^\/$/, place: "home", nav: "" },
+  { pattern: /^\/films$/, place: "films", nav: "films" },
+  { pattern: /^\/films\/([^/]+)$/, place: "film", nav: "films" },
+  { pattern: /^\/libraries\/([^/]+)$/, place: "desk", nav: "films" },
+  { pattern: /^\/libraries\/([^/]+)\/studio$/, place: "studio", nav: "studio" },
+  { pattern: /^\/studio$/, place: "studio", nav: "studio" },
+  { pattern: /^\/libraries\/([^/]+)\/fish$/, place: "fish", nav: "films" },
+  { pattern: /^\/flocks$/, place: "reels", nav: "flocks" },
+  { pattern: /^\/flocks\/([^/]+)$/, place: "reel", nav: "flocks" },
+  { pattern: /^\/jobs$/, place: "jobs", nav: "jobs" },
+  { pattern: /^\/s\/([^/]+)$/, place: "shared", nav: "" },
+];
+
+/** Style sheets of the places that are instruments, in the order of the cascade. The others use those of index.html. */
+const STYLES = ["form", "timeline", "studio", "reel", "desk", "fish"];
+const PLAIN = ["home", "films", "film", "jobs", "missing"];
+
+let leaving = new AbortController();
+
+/** Starts the router: shows the place of the current address. */
+export function startRouter() {
+  history.scrollRestoration = "manual";
+  addEventListener("popstate", () => show({ scroll: history.state?.scroll ?? 0 }));
+  document.addEventListener("click", (event) => {
+    const link = /** @type {HTMLElement} */ (event.target).closest?.("a[href]");
+    if (!(link instanceof HTMLAnchorElement) || !isInside(link, event)) return;
+    event.preventDefault();
+    go(link.pathname + link.search);
+  });
+  return show({});
+}
+
+/** @param {HTMLAnchorElement} link @param {MouseEvent} event */
+function isInside(link, event) {
+  const plain = event.button === 0 && !event.metaKey && !event.ctrlKey && !event.shiftKey && !event.altKey;
+  // The page of a guest has not started its jobs, so its links load the page.
+  return plain && !document.body.classList.contains("guest") && !event.defaultPrevented && !link.target && !link.hasAttribute("download") &&
+    link.origin === location.origin && routeOf(link.pathname) !== undefined && !link.hash;
+}
+
+/** @param {string} path */
+const routeOf = (path) => ROUTES.find(({ pattern }) => pattern.test(path));
+
+/** Goes to an address of the page. @param {string} address @param {any} [state] handed to the place */
+export function go(address, state) {
+  history.replaceState({ ...history.state, scroll: scrollY }, "");
+  history.pushState({ given: state }, "", address);
+  return show({ focus: true });
+}
+
+/** Changes the address of the current place, for instance while scrubbing. @param {string} address */
+export const replaceAddress = (address) => history.replaceState(history.state, "", address);
+
+/** Sets the title of the document. @param {string} [title] */
+export const setTitle = (title) => { document.title = title ? `${title} · flockreel` : "flockreel"; };
+
+/** Loads a style sheet once. @param {string} name */
+export function styled(name) {
+  const href = `/static/css/${name}.css`;
+  if (document.querySelector(`link[href="${href}"]`)) return undefined;
+  const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href });
+  document.head.append(link);
+  return new Promise((resolve) => { link.onload = link.onerror = resolve; });
+}
+
+/** @returns {Promise<void>} */
+async function show({ focus = false, scroll = 0 }) {
+  leaving.abort();
+  leaving = new AbortController();
+  const life = leaving.signal;
+  const route = routeOf(location.pathname);
+  for (const link of document.querySelectorAll("[data-nav]")) {
+    const isHere = /** @type {HTMLElement} */ (link).dataset.nav === (route?.nav || "none");
+    if (isHere) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  const root = byId("place");
+  const id = decodeURIComponent(route?.pattern.exec(location.pathname)?.[1] ?? "");
+  setTitle();
+  try {
+    const name = route?.place ?? "missing";
+    /** @type {[Place, ...unknown[]]} */
+    const [place] = await Promise.all([import(`../places/${name}.js`), ...(PLAIN.includes(name) ? [] : STYLES.map(styled))]);
+    if (life.aborted) return;
+    root.replaceChildren();
+    root.className = `place place-${name}`;
+    const shown = place.show(root, { id, query: new URLSearchParams(location.search), life, state: history.state?.given });
+    scrollTo(0, scroll);
+    await shown;
+    if (life.aborted) return;
+    if (focus) root.querySelector("h1")?.focus({ preventScroll: true });
+    if (scroll) scrollTo(0, scroll);
+  } catch (problem) {
+    if (life.aborted || /** @type {any} */ (problem).name === "AbortError") return;
+    if (!root.querySelector("h1") && /** @type {any} */ (problem).status === 404) return (await import("../places/missing.js")).show(root);
+    setTitle(say("problem.title"));
+    // Without a connection, the modules of a place cannot be loaded.
+    showProblem(root, problem instanceof TypeError && !navigator.onLine ? unreachable() : problem);
+    root.prepend(element("h1", { tabIndex: -1 }, say("problem.title")));
+  }
+}

@@ -1,0 +1,127 @@
+// The picture of "Measure again", on which the person points at the animal or its head, frames regions to ignore,
+// and draws a ruler. With the keyboard, arrows move a cross, and Enter sets a point or the corners of a box.
+// @ts-check
+import { say } from "../app/words.js";
+import { drawnCanvas, fitted, loadPicture } from "./canvas.js";
+
+/** @typedef {"animal" | "head" | "ignore" | "ruler"} Tool */
+/** Shortest side of a box and length of a ruler, pixels of the film. */
+const LEAST_PX = 4;
+
+/**
+ * @param {import("./instrument.js").Instrument} desk
+ * @param {{video: HTMLVideoElement, isBroken: boolean, tool: import("../app/store.js").Signal<Tool>, draft: import("../app/store.js").Signal<any>, ruler: import("../app/store.js").Signal<number[][] | null>, life: AbortSignal}} parts
+ */
+export function createPicture(desk, { video, isBroken, tool, draft, ruler, life }) {
+  const size = desk.library.image_size_px;
+  /** @type {ImageBitmap | null} */
+  let background = null;
+  /** Start and end of what is being drawn, pixels of the film. @type {number[][] | null} */
+  let drawing = null;
+  /** Cross of the keyboard. */
+  let cross = size.map((/** @type {number} */ side) => side / 2);
+  let isKeyboard = false;
+  const { canvas, ask } = drawnCanvas(life, draw, { tabIndex: 0, className: "anew-picture", role: "application", "aria-label": say("anew.picture") });
+  canvas.style.aspectRatio = size.join(" / ");
+
+  /** @param {import("./canvas.js").Paper} paper */
+  function draw({ context, width, height, colors }) {
+    const { zoom, left, top } = fitted(size, width, height);
+    context.translate(left, top);
+    context.scale(zoom, zoom);
+    const source = !isBroken && video.readyState >= 2 ? video : background;
+    if (source) context.drawImage(source, 0, 0, size[0], size[1]);
+    context.lineWidth = 2 / zoom;
+    const frames = [...draft.value.ignore.map(({ box_px }) => box_px), ...(drawing && tool.value === "ignore" ? [boxOf(drawing)] : [])];
+    for (const [x, y, w, h] of frames) {
+      context.fillStyle = "rgb(163 22 31 / 0.45)";
+      context.fillRect(x, y, w, h);
+      context.strokeStyle = "#fff";
+      context.strokeRect(x, y, w, h);
+    }
+    const line = drawing && tool.value === "ruler" ? drawing : ruler.value;
+    if (line) drawRuler(context, line, zoom, colors);
+    for (const [point, color] of [[draft.value.animal_at?.at_px, colors.accent], [draft.value.head?.point, colors.water]]) if (point) drawTarget(context, point, color, zoom);
+    if (isKeyboard) drawTarget(context, cross, "#fff", zoom);
+  }
+
+  /** @param {PointerEvent} event @returns {number[]} */
+  const pointOf = (event) => {
+    const box = canvas.getBoundingClientRect();
+    const { zoom, left, top } = fitted(size, box.width, box.height);
+    return [(event.clientX - box.left - left) / zoom, (event.clientY - box.top - top) / zoom].map((value, k) => Math.min(size[k], Math.max(0, Math.round(value * 10) / 10)));
+  };
+  const begin = (/** @type {number[]} */ point) => { drawing = [point, point]; ask(); };
+  const end = () => {
+    if (!drawing) return;
+    const [from, to] = drawing;
+    const frame = desk.moment.value;
+    if (tool.value === "animal") draft.set({ ...draft.value, animal_at: { frame, at_px: to } });
+    if (tool.value === "head") draft.set({ ...draft.value, head: { frame, point: to } });
+    const box_px = boxOf(drawing);
+    if (tool.value === "ignore" && box_px[2] >= LEAST_PX && box_px[3] >= LEAST_PX) draft.set({ ...draft.value, ignore: [...draft.value.ignore, { box_px, from_s: null, to_s: null }] });
+    if (tool.value === "ruler" && Math.hypot(to[0] - from[0], to[1] - from[1]) >= LEAST_PX) ruler.set(drawing);
+    drawing = null;
+    ask();
+  };
+  canvas.addEventListener("pointerdown", (event) => { canvas.setPointerCapture(event.pointerId); isKeyboard = false; begin(pointOf(event)); });
+  canvas.addEventListener("pointermove", (event) => { if (drawing && !isKeyboard) { drawing = [drawing[0], pointOf(event)]; ask(); } });
+  canvas.addEventListener("pointerup", end);
+  canvas.addEventListener("pointercancel", () => { drawing = null; ask(); });
+  canvas.addEventListener("keydown", (event) => {
+    const step = event.shiftKey ? 1 : 10;
+    const by = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] }[event.key];
+    if (!by && event.key !== "Enter") return;
+    event.preventDefault();
+    isKeyboard = true;
+    if (by) cross = cross.map((/** @type {number} */ value, /** @type {number} */ k) => Math.min(size[k], Math.max(0, value + by[k])));
+    else if (!drawing) { begin([...cross]); if (tool.value === "animal" || tool.value === "head") end(); } else end();
+    if (drawing) drawing = [drawing[0], [...cross]];
+    ask();
+  });
+  canvas.addEventListener("blur", () => { isKeyboard = false; ask(); });
+  for (const seen of [draft, ruler, tool, desk.moment]) seen.watch(ask, life);
+  video.addEventListener("seeked", ask, { signal: life });
+  if (isBroken || video.readyState < 2) void loadPicture(`/v1/libraries/${desk.library.id}/background.png`, life).then((found) => { background = found; ask(); });
+  return canvas;
+}
+
+/** Returns the box between two corners. @param {number[][]} corners */
+export function boxOf([a, b]) {
+  const [x, y] = [0, 1].map((k) => Math.floor(Math.min(a[k], b[k])));
+  return [x, y, Math.ceil(Math.max(a[0], b[0])) - x, Math.ceil(Math.max(a[1], b[1])) - y];
+}
+
+/** Draws a cross in a ring. */
+function drawTarget(context, [x, y], color, zoom) {
+  const unit = 1 / zoom;
+  for (const [style, wide] of [["rgb(10 17 20 / 0.7)", 5], [color, 2.5]]) {
+    context.strokeStyle = style;
+    context.lineWidth = wide * unit;
+    context.beginPath();
+    context.arc(x, y, 10 * unit, 0, 7);
+    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+      context.moveTo(x + 4 * dx * unit, y + 4 * dy * unit);
+      context.lineTo(x + 16 * dx * unit, y + 16 * dy * unit);
+    }
+    context.stroke();
+  }
+}
+
+/** Draws a line with ends. @param {CanvasRenderingContext2D} context @param {number[][]} line @param {number} zoom @param {Record<string, string>} colors */
+function drawRuler(context, [[ax, ay], [bx, by]], zoom, colors) {
+  const far = Math.hypot(bx - ax, by - ay) || 1;
+  const [nx, ny] = [(-(by - ay) / far) * (9 / zoom), ((bx - ax) / far) * (9 / zoom)];
+  for (const [style, wide] of /** @type {[string, number][]} */ ([["rgb(10 17 20 / 0.7)", 6], [colors.water, 3]])) {
+    context.strokeStyle = style;
+    context.lineWidth = wide / zoom;
+    context.beginPath();
+    context.moveTo(ax, ay);
+    context.lineTo(bx, by);
+    for (const [x, y] of [[ax, ay], [bx, by]]) {
+      context.moveTo(x - nx, y - ny);
+      context.lineTo(x + nx, y + ny);
+    }
+    context.stroke();
+  }
+}

@@ -1,0 +1,136 @@
+// "Measure again": a dialog that changes settings of the measurement, by fields and by pointing at the picture,
+// and starts an analysis. Its result is shown beside the numbers before.
+// @ts-check
+import { get, post } from "../app/api.js";
+import { element } from "../app/element.js";
+import { ended, expect } from "../app/jobs.js";
+import { signal } from "../app/store.js";
+import { count, say } from "../app/words.js";
+import { mendsOf } from "../parts/mend.js";
+import { problemBox, showProblem } from "../parts/problem.js";
+import { jobCard } from "../parts/tray.js";
+import { choice, part, rulerFields, slide } from "./anew-fields.js";
+import { changedParams, sizeFromRuler } from "./anew-params.js";
+import { createPicture } from "./anew-picture.js";
+import { comparison, settingName } from "./numbers.js";
+
+const TOOLS = ["animal", "head", "ignore", "ruler"];
+
+/**
+ * Opens the dialog. @param {import("./instrument.js").Instrument} desk
+ * @param {{player: import("./player.js").Player, results: HTMLElement, tool?: string, params?: any}} options
+ */
+export async function measureAnew(desk, { player, results, tool: first = "animal", params = {} }) {
+  const { library } = desk;
+  player.pause();
+  const closing = new AbortController();
+  const life = closing.signal;
+  const defaults = await defaultParams(desk.life);
+  const former = { ...defaults, ...library.params };
+  const draft = signal({ ...former, ...params, ignore: params.ignore ?? former.ignore ?? [] });
+  const tool = signal(/** @type {any} */ (TOOLS.includes(first) ? first : "animal"));
+  const ruler = signal(/** @type {number[][] | null} */ (null));
+  const picture = createPicture(desk, { video: player.video, isBroken: player.isBroken.value, tool, draft, ruler, life });
+
+  const radios = TOOLS.map((name) => element("label.choice", {}, element("input", { type: "radio", name: "anew-tool", value: name, checked: name === tool.value, onchange: () => tool.set(name) }), element("span", {}, say(`anew.tool.${name}`))));
+  const help = element("p.soft");
+  const measures = { line_cm: 0, away_cm: former.camera ? 100 * former.camera.z_min_m : 0, medium_index: former.camera?.medium_index ?? (library.view === "side" ? 1.333 : 1) };
+  const size = element("div", {}, rulerFields((name, value) => { /** @type {any} */ (measures)[name] = value; applyRuler(); }, measures));
+  tool.watch((now) => { help.textContent = say(`anew.tool.${now}.help`); size.hidden = now !== "ruler"; }, life);
+  const applyRuler = () => {
+    if (!ruler.value || !(measures.line_cm > 0) || !(measures.away_cm > 0)) return;
+    const [a, b] = ruler.value;
+    draft.set({ ...draft.value, ...sizeFromRuler({ ...measures, line_px: Math.hypot(b[0] - a[0], b[1] - a[1]), length_px: library.length_px ?? 100, height_px: heightOf(desk.columns.value) ?? 0.4 * (library.length_px ?? 100) }) });
+  };
+  ruler.watch(applyRuler, life);
+  const frame = element("input", { type: "range", min: desk.first, max: desk.last(), step: 1, "aria-label": say("desk.frame"), oninput: () => desk.goTo(frame.valueAsNumber) });
+  desk.moment.watch((now) => { frame.value = String(now); }, life);
+
+  let preset = "";
+  const presets = element("select", { name: "preset", onchange: () => { preset = presets.value; tell(); } }, ...["", "papers"].map((name) => element("option", { value: name }, say(`anew.preset.${name || "none"}`))));
+  const marks = element("ul.anew-marks");
+  const sent = element("p.soft", { role: "status" });
+  const problem = element("div");
+  const start = element("button", { type: "submit" }, say("anew.start"));
+  const changes = () => changedParams({ draft: draft.value, former, defaults, preset });
+  const tell = () => {
+    marks.replaceChildren(...marksOf(draft));
+    const names = [...(preset ? ["preset"] : []), ...Object.keys(changes()).filter((name) => name !== "preset" && JSON.stringify(draft.value[name]) !== JSON.stringify(former[name]))];
+    sent.textContent = names.length ? say("anew.sends", { names: names.map(settingName).join(", ") }) : say("anew.sends_none");
+  };
+  draft.watch(tell, life);
+
+  const form = element("form", { method: "dialog" },
+    element("header.place-head", {}, element("h2", {}, say("anew.title")), element("button.quiet", { type: "button", onclick: () => dialog.close() }, say("cancel"))),
+    element("div.anew-columns", {},
+      element("div.anew-left", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("anew.tools")), ...radios), help, element("div.anew-room", {}, picture), frame, size, marks),
+      element("div.anew-right", {}, choice(draft, "view", [null, "side", "top"]), choice(draft, "follow", ["one", "largest"]), slide(draft, "threshold", { min: 1, max: 100, step: 1 }), part(draft, desk), slide(draft, "kappa", { min: 1, max: 6, step: 0.5 }), choice(draft, "sprites", ["auto", "always"]),
+        element("label.field", {}, say("anew.preset"), presets, element("small", {}, say("anew.preset.help"))))),
+    element("footer.anew-foot", {}, sent, problem, start));
+  const dialog = element("dialog.anew", { "aria-label": say("anew.title") }, form);
+  dialog.addEventListener("close", () => { closing.abort(); dialog.remove(); });
+  form.addEventListener("submit", async (/** @type {Event} */ event) => {
+    event.preventDefault();
+    start.disabled = true;
+    try {
+      const params = changes();
+      const begun = await post("/v1/analyses", { footage_id: library.footage_id, params });
+      dialog.close();
+      await follow(desk, { begun, params, results, player });
+    } catch (reason) {
+      showProblem(problem, reason);
+      start.disabled = false;
+    }
+  });
+  document.body.append(dialog);
+  desk.life.addEventListener("abort", () => dialog.close());
+  dialog.showModal();
+  if (first === "part") form.elements.from_s.focus();
+}
+
+/** Returns the defaults of all parameters of an analysis. @param {AbortSignal} life @returns {Promise<Record<string, any>>} */
+async function defaultParams(life) {
+  const { components } = await get("/openapi.json", life);
+  return Object.fromEntries(Object.entries(components.schemas.AnalysisParams.properties).map(([name, property]) => [name, /** @type {any} */ (property).default ?? null]));
+}
+
+/** Shows an analysis while it runs, and its numbers beside the former ones. @param {import("./instrument.js").Instrument} desk */
+async function follow(desk, { begun: { job_id: jobId, library_id: libraryId }, params, results, player }) {
+  await expect(jobId);
+  const card = jobCard({ id: jobId, kind: "analysis", subject: { kind: "footage", id: desk.library.footage_id } });
+  results.replaceChildren(element("h2", {}, say("anew.title")), card);
+  results.scrollIntoView({ block: "center" });
+  try {
+    await ended(jobId, desk.life, card.update);
+    const [library, facts] = await Promise.all([get(`/v1/libraries/${libraryId}`, desk.life), get(`/v1/libraries/${libraryId}/library.json`, desk.life)]);
+    const link = element("a.button", { href: `/libraries/${libraryId}?compare=${desk.library.id}` }, say("anew.open"));
+    results.replaceChildren(element("h2", {}, say("desk.compare.title")), comparison({ library: desk.library, facts: desk.facts.value }, { library, facts }), element("p.actions", {}, link));
+  } catch (reason) {
+    if (desk.life.aborted) return;
+    if (/** @type {any} */ (reason).name === "AbortError") results.replaceChildren();
+    else {
+      const mends = mendsOf(reason, (mend) => measureAnew(desk, { player, results, params: { ...params, ...mend } }));
+      const again = { label: say("anew.again"), act: () => measureAnew(desk, { player, results, params }) };
+      results.replaceChildren(problemBox(reason, [...mends, again]));
+    }
+  }
+}
+
+/** Returns the list of what was drawn, each with a button that removes it. @param {import("./anew-fields.js").Draft} draft */
+function marksOf(draft) {
+  const { animal_at, head, ignore, camera, animal } = draft.value;
+  const row = (/** @type {string} */ text, /** @type {any} */ without) => element("li", {}, element("span", {}, text), element("button.quiet", { type: "button", "aria-label": say("anew.remove_one", { what: text }), onclick: () => draft.set({ ...draft.value, ...without }) }, say("anew.remove")));
+  const at = (/** @type {number[]} */ point) => point.map(Math.round).join(", ");
+  return [
+    ...(animal_at ? [row(say("anew.mark.animal", { at: at(animal_at.at_px), frame: String(animal_at.frame) }), { animal_at: null })] : []),
+    ...(head ? [row(say("anew.mark.head", { at: at(head.point), frame: String(head.frame) }), { head: null })] : []),
+    ...ignore.map((/** @type {any} */ one, /** @type {number} */ k) => row(say("anew.mark.ignore", { size: `${one.box_px[2]} × ${one.box_px[3]}` }), { ignore: ignore.filter((/** @type {any} */ _, /** @type {number} */ idx) => idx !== k) })),
+    ...(camera && animal ? [row(say("anew.mark.size", { cm: count(100 * animal.length_m) }), { camera: null, animal: null })] : []),
+  ];
+}
+
+/** Returns the median height of the animal, pixels; null without one. @param {import("./columns.js").Columns} columns */
+function heightOf({ height_px, n }) {
+  const heights = height_px.slice(0, n).filter((one) => !Number.isNaN(one)).sort();
+  return heights.length ? heights[heights.length >> 1] : null;
+}

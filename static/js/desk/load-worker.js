@@ -1,0 +1,90 @@
+// A worker that loads poses.json and library.json of a film. It reads the poses line by line while they arrive and
+// sends what it has from time to time, so that the page shows the start of a long film early and never waits for
+// the parser.
+// @ts-check
+import { append, derive, emptyColumns, fillTailBeat, measureRanges } from "./columns.js";
+
+/** Time until the first report, ms; it doubles from report to report, because each one copies all columns. */
+const REPORT_MS = 300;
+/** Most jumps that are sent, the best first. More cannot be told apart on a screen. */
+const MOST_JUMPS = 2000;
+
+/** @type {any} */
+const page = self;
+page.onmessage = (/** @type {MessageEvent} */ { data }) => {
+  load(data).then((message) => page.postMessage(message, buffersOf(message.columns)), (error) => page.postMessage({ failed: { status: error.status ?? 0, text: error.text ?? "" } }));
+};
+
+/** Returns the memory of the columns, which moves to the page without a copy. @param {any} columns */
+const buffersOf = (columns) => Object.values(columns).filter((one) => ArrayBuffer.isView(one)).map(({ buffer }) => buffer);
+
+/** @param {{base: string, most: number, fps: number, length_px: number | null}} asked base: address of the library */
+async function load({ base, most, fps, length_px }) {
+  const [columns] = await Promise.all([loadPoses(`${base}/poses.json`, emptyColumns(most, fps), length_px), loadLibrary(`${base}/library.json`)]);
+  return { columns, done: true };
+}
+
+/** @param {string} address */
+async function fetched(address) {
+  const answer = await fetch(address);
+  if (!answer.ok) throw Object.assign(new Error(), { status: answer.status, text: await answer.text() });
+  return answer;
+}
+
+/** @param {string} address @param {import("./columns.js").Columns} columns @param {number | null} length_px */
+async function loadPoses(address, columns, length_px) {
+  const reader = /** @type {ReadableStream<string>} */ (/** @type {any} */ ((await fetched(address)).body).pipeThrough(new TextDecoderStream())).getReader();
+  let [rest, head, n_derived, next, pause_ms] = ["", "", 0, performance.now() + REPORT_MS, REPORT_MS];
+  for (;;) {
+    const { value, done } = await reader.read();
+    const lines = (rest + (value ?? "")).split("\n");
+    rest = done ? "" : lines.pop() ?? "";
+    for (const line of lines) {
+      if (line.startsWith('{"frame":')) {
+        if (columns.n === columns.time_s.length) columns = longer(columns);
+        append(columns, JSON.parse(line.endsWith(",") ? line.slice(0, -1) : line));
+      } else head += line;
+    }
+    if (done) break;
+    if (performance.now() < next || columns.n < 2) continue;
+    derive(columns, length_px, n_derived, columns.n);
+    n_derived = Math.max(0, columns.n - Math.ceil(columns.fps));
+    measureRanges(columns);
+    page.postMessage({ columns });
+    pause_ms *= 2;
+    next = performance.now() + pause_ms;
+  }
+  const { frames, ...facts } = JSON.parse(head);
+  // A file that was written by another program may hold its frames otherwise.
+  if (!columns.n && frames.length) {
+    columns = emptyColumns(frames.length, columns.fps);
+    for (const pose of frames) append(columns, pose);
+  }
+  derive(columns, length_px);
+  fillTailBeat(columns, facts.tail_beat?.spans ?? []);
+  measureRanges(columns);
+  page.postMessage({ head: facts });
+  return columns;
+}
+
+/** Returns columns with twice the room: the film has more frames than it said. @param {import("./columns.js").Columns} old */
+function longer(old) {
+  const columns = emptyColumns(2 * old.n, old.fps);
+  if (old.hasMidline) columns.midline_px = new Float32Array(2 * old.midline_px.length).fill(NaN);
+  for (const [name, value] of Object.entries(old)) {
+    if (ArrayBuffer.isView(value)) /** @type {any} */ (columns)[name].set(value);
+    else /** @type {any} */ (columns)[name] = value;
+  }
+  return columns;
+}
+
+/** @param {string} address */
+async function loadLibrary(address) {
+  const { clip_frames, natural_step, epsilon, stats, transitions, patches = [], playback = [] } = await (await fetched(address)).json();
+  const jumps = transitions.map((/** @type {any} */ one) => ({ from: one.from, to: one.to, mirrored: one.mirrored, distance: one.distance }))
+    .sort((/** @type {any} */ a, /** @type {any} */ b) => a.distance - b.distance).slice(0, MOST_JUMPS);
+  const column = (/** @type {any[]} */ rows, /** @type {(row: any) => number} */ of) => Int32Array.from(rows, of);
+  const found = { start: column(patches, (one) => one.start), end: column(patches, (one) => one.end) };
+  const leaps = { from: column(playback, ([from]) => from), to: column(playback, ([, to]) => to), mirrored: Uint8Array.from(playback, (row) => (row[3] ? 1 : 0)) };
+  page.postMessage({ library: { clip_frames, natural_step, epsilon, stats, jumps, patches: found, leaps } });
+}

@@ -1,0 +1,63 @@
+// The numbers of a measurement in plain words, alone or beside those of another measurement of the same film.
+// @ts-check
+import { element } from "../app/element.js";
+import { count, percent, say, sayOr, seconds } from "../app/words.js";
+
+/** @typedef {{library: any, facts: any, head?: any}} Measured facts and head are null until they are loaded */
+
+/**
+ * Returns the numbers: the key of the words, the value as text, and values for the words.
+ * @param {Measured} measured @returns {{key: string, value: string, values?: any}[]}
+ */
+export function numbersOf({ library, facts, head = null }) {
+  const stats = facts?.stats;
+  const camera = library.params?.camera;
+  const beat = head?.tail_beat?.spans?.[0];
+  const speeds = stats?.speed_bl_per_s;
+  return /** @type {any[]} */ ([
+    { key: "frames", value: count(library.n_frames), values: { time: seconds(library.n_frames / library.fps), fps: library.fps } },
+    { key: "seen", value: percent(library.detected_share) },
+    { key: "view", value: say(`desk.view.${library.view}`) },
+    library.length_px && { key: "length", value: camera ? say("unit.cm", { n: (100 * library.length_px) / camera.pane_px_per_m }) : say("unit.px", { n: library.length_px }) },
+    speeds && { key: "speed", value: say("unit.bl_per_s", { n: speeds[1] }), values: { least: speeds[0], most: speeds[2] } },
+    beat && { key: "tail_beat", value: say("unit.hz", { n: beat.frequency_hz }) },
+    { key: "jumps", value: count(library.n_transitions) },
+    { key: "endless", value: percent(library.component_share) },
+  ].filter(Boolean));
+}
+
+/** Returns the list of numbers with what they mean. @param {Measured} measured */
+export const numberList = (measured) => element("dl.numbers", {}, ...numbersOf(measured).map(({ key, value, values }) => element("div", {}, element("dt", {}, say(`desk.number.${key}`), element("small", {}, say(`desk.number.${key}.means`, values))), element("dd", {}, value))));
+
+/** Returns a table of two measurements side by side; rows that differ are marked. @param {Measured} before @param {Measured} after */
+export function comparison(before, after) {
+  const [old, now] = [before, after].map(numbersOf);
+  const rows = now.map(({ key, value }) => {
+    const former = old.find((one) => one.key === key)?.value ?? "–";
+    return element("tr", { className: former === value ? "" : "changed" }, element("th", { scope: "row" }, say(`desk.number.${key}`)), element("td", {}, former), element("td", {}, value));
+  });
+  const settings = settingRows(before.library.params ?? {}, after.library.params ?? {});
+  const heads = ["what", "before", "after"].map((name) => element("th", { scope: "col" }, say(`desk.compare.${name}`)));
+  return element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("desk.compare.title") }, element("table.comparison", {}, element("caption.unseen", {}, say("desk.compare.title")), element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...settings, ...rows)));
+}
+
+/** Returns the words for a setting. @param {string} name */
+export const settingName = (name) => sayOr(`anew.${name}`, name);
+
+/** Returns a row for each setting that differs. @param {any} before @param {any} after */
+function settingRows(before, after) {
+  const names = Object.keys(after).filter((name) => JSON.stringify(before[name] ?? null) !== JSON.stringify(after[name] ?? null));
+  return names.map((name) => element("tr.changed", {}, element("th", { scope: "row" }, settingName(name), " ", element("small", {}, say("desk.compare.setting"))), ...[before, after].map((params) => element("td", {}, settingWords(name, params[name])))));
+}
+
+/** Returns the value of a setting in words. @param {string} name @param {any} value */
+export function settingWords(name, value) {
+  if (value === null || value === undefined) return sayOr(`anew.${name}.null`, "–");
+  const exact = (/** @type {number} */ one) => String(Number(one.toPrecision(4)));
+  if (name === "camera") return say("desk.compare.camera", { cm: exact(100 * value.z_min_m), px: exact(value.pane_px_per_m / 100) });
+  if (name === "animal") return say("desk.compare.animal", { length: exact(100 * value.length_m), height: exact(100 * value.height_m) });
+  if (name === "ignore") return count(value.length);
+  if (name === "animal_at" || name === "head") return say("desk.compare.point", { at: (value.at_px ?? value.point).map(Math.round).join(", "), frame: String(value.frame) });
+  if (name === "from_s" || name === "to_s") return seconds(value);
+  return sayOr(`anew.${name}.${value}`, typeof value === "object" ? JSON.stringify(value) : String(value));
+}

@@ -1,0 +1,77 @@
+// The options of a virtual fish, read from the schema of the service, and the job that makes one.
+// @ts-check
+import { get, post } from "../app/api.js";
+import { element } from "../app/element.js";
+import { ended, expect, resultOf } from "../app/jobs.js";
+import { say } from "../app/words.js";
+import { problemBox } from "../parts/problem.js";
+import { jobCard } from "../parts/tray.js";
+import { control } from "../studio/control.js";
+import { fieldsOf } from "../studio/schema.js";
+import { changedFrom, PAPERS, shownAs } from "./settings.js";
+
+/** Names in the order of use; the service may tell more. */
+const ORDER = ["palette", "swim", "bank_rad", "smooth_s", "bridge_s", "length_m", "height_m"];
+
+/**
+ * @param {{library: any, params: any, life: AbortSignal, onMade: (id: string) => void}} options params: of the fish that is shown, null = none
+ */
+export async function optionsBox({ library, params, life, onMade }) {
+  const { components } = await get("/openapi.json", life);
+  const fields = new Map([...fieldsOf(components.schemas, "FishParams", "FishRequest")].map(([name, field]) => [name, shownAs(field, library)]));
+  const names = [...new Set([...ORDER, ...fields.keys()])].filter((name) => fields.has(name) && name !== "preset");
+  let settings = changedFrom(params, fields);
+  /** @param {Record<string, any>} patch undefined = the default */
+  const change = (patch) => {
+    settings = changedFrom({ ...settings, ...patch }, fields);
+    update();
+  };
+  const controls = names.map((name) => control(/** @type {any} */ (fields.get(name)), { change, fields }));
+  const update = () => {
+    for (const { name, update: show } of controls) {
+      const field = /** @type {any} */ (fields.get(name));
+      show(settings[name] ?? field.default, { isSet: name in settings, perUnit: field.perUnit });
+    }
+  };
+  const papers = element("button.quiet", { type: "button", onclick: () => change(PAPERS) }, say("fish.papers"));
+  const { button, state } = maker({ libraryId: library.id, settings: () => settings, life, onMade, isFirst: !params });
+  update();
+  return element("section.fish-options", {}, element("h2", {}, say("fish.options")), element("div.settings", {}, ...controls.map(({ node }) => node)),
+    element("p.actions", {}, button, papers), element("p.soft", {}, say("fish.papers.help")), state);
+}
+
+/**
+ * Returns the button that makes a virtual fish, and where its progress is shown.
+ * @param {{libraryId: string, settings: () => any, life: AbortSignal, onMade: (id: string) => void, isFirst?: boolean}} options
+ */
+export function maker({ libraryId, settings, life, onMade, isFirst = false }) {
+  const button = element("button.make-fish", { type: "button", onclick: make }, say(isFirst ? "fish.make" : "fish.make.other"));
+  const state = element("div.make-state", { "aria-live": "polite" });
+
+  async function make() {
+    button.disabled = true;
+    try {
+      const { job_id } = await post("/v1/fish", { library_id: libraryId, ...settings() }, life);
+      await expect(job_id);
+      await follow(job_id);
+    } catch (problem) {
+      if (life.aborted) return;
+      if (/** @type {any} */ (problem).name === "AbortError") state.replaceChildren();
+      else state.replaceChildren(problemBox(problem));
+      button.focus();
+    }
+    button.disabled = false;
+  }
+
+  /** Shows a job until it has ended. @param {string} jobId */
+  async function follow(jobId) {
+    /** @type {any} */
+    let card = null;
+    const done = await ended(jobId, life, (job) => {
+      if (!card) state.replaceChildren(card = jobCard(job));
+      card.update(job);
+    });
+    onMade(resultOf(done));
+  }
+  return { button, state, follow };
+}

@@ -1,0 +1,75 @@
+// The virtual fish of a film: every one that was made, with its files.
+// @ts-check
+import { list, request } from "../app/api.js";
+import { element } from "../app/element.js";
+import { filmName } from "../app/names.js";
+import { ago, day, say, size } from "../app/words.js";
+import { choiceOf } from "../studio/control.js";
+import { deleted, deleteLater } from "../parts/undo.js";
+import { savedName } from "./settings.js";
+
+/** Pages of the list that are searched for the fish of a film. */
+const MOST_PAGES = 10;
+/** Time in which the browser begins to save a file, ms. */
+const KEPT_MS = 60_000;
+
+/** Returns the virtual fish of a library, newest first. @param {string} libraryId @param {AbortSignal} life */
+export async function fishOf(libraryId, life) {
+  const found = [];
+  let address = /** @type {string | null} */ ("/v1/fish?limit=200");
+  for (let page = 0; address && page < MOST_PAGES; page++) {
+    const { items, next } = await list(address, life);
+    found.push(...items.filter((one) => one.library_id === libraryId && !deleted.value.has(one.id)));
+    address = next;
+  }
+  return found;
+}
+
+/**
+ * Saves a file under the page's name: the one that the service tells has the id instead of the film.
+ * @param {MouseEvent} event @param {string} href @param {string} download
+ */
+async function save(event, href, download) {
+  if (event.ctrlKey || event.metaKey || event.shiftKey || event.altKey) return;
+  event.preventDefault();
+  try {
+    const url = URL.createObjectURL(await (await request("GET", href)).blob());
+    element("a", { href: url, download }).click();
+    setTimeout(() => URL.revokeObjectURL(url), KEPT_MS);
+  } catch {
+    location.assign(href);
+  }
+}
+
+/** Returns what a virtual fish is, in a few words. @param {any} fish */
+export const fishName = ({ params }) => [choiceOf("palette", params.palette ?? ""), params.swim === false && say("fish.rigid"), params.bank_rad === 0 && say("fish.upright")].filter(Boolean).join(", ");
+
+/**
+ * Returns the table of the fish of a film with their downloads.
+ * @param {any[]} all @param {{library: any, shown: string, life: AbortSignal, onDelete: (id: string) => void}} options
+ */
+export function versionTable(all, { library, shown, life, onDelete }) {
+  const film = filmName(library);
+  const file = (/** @type {any} */ fish, /** @type {string} */ name) => {
+    const ending = name.split(".")[1];
+    const [href, download] = [`/v1/fish/${fish.id}/${name}`, savedName(film, fish.params, ending)];
+    return element("a.file-link", { href, download, onclick: (/** @type {MouseEvent} */ event) => save(event, href, download) }, say(`fish.file.${ending}`));
+  };
+  const rows = all.map((fish) => {
+    const name = fishName(fish);
+    const drop = element("button.quiet", { type: "button", "aria-label": say("fish.delete.of", { name }), onclick: () => {
+      const undo = deleteLater({ id: fish.id, path: `/v1/fish/${fish.id}`, name });
+      onDelete(fish.id);
+      undo.focus();
+    } }, say("reel.delete"));
+    const here = fish.id === shown;
+    const node = element("tr", here ? { "aria-current": "true" } : {},
+      element("th", { scope: "row" }, here ? name : element("a", { href: `/libraries/${library.id}/fish?fish=${fish.id}` }, name), element("small", { title: day(fish.created_at) }, ` ${here ? say("fish.shown") : ago(fish.created_at)}`)),
+      element("td", {}, file(fish, "model.glb")), element("td", {}, file(fish, "video.mp4")), element("td.size", {}, size(fish.size_bytes)), element("td", {}, drop));
+    deleted.watch((gone) => { node.hidden = gone.has(fish.id); }, life);
+    return node;
+  });
+  const heads = ["which", "model", "film", "size", "delete"].map((name) => element("th", { scope: "col" }, name === "delete" ? element("span.unseen", {}, say("reel.delete")) : say(`fish.table.${name}`)));
+  return element("section", {}, element("h2", {}, say("fish.files")), element("p.soft", {}, say("fish.files.help")),
+    element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("fish.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
+}

@@ -1,0 +1,93 @@
+// A living flock: the canvas on which a planned flock swims, made of the atlas and the plan of a library.
+// @ts-check
+import { get, request } from "../app/api.js";
+import { element } from "../app/element.js";
+import { say } from "../app/words.js";
+import { planSource } from "../flock/appearance.js";
+import { loadAtlas } from "../flock/atlas.js";
+import { createDrawer, sceneOf } from "../flock/drawer.js";
+import { decodePlan } from "../flock/plan.js";
+import { attach, createPlayer } from "../flock/play.js";
+
+/** Media type of a binary plan. */
+const PLAN = "application/vnd.flockreel.plan";
+/** Time between two updates of the sentence for screen readers, ms. */
+const DESCRIBE_MS = 5000;
+
+/** Asks the service for a plan. @param {string} libraryId @param {any} params @param {AbortSignal} [signal] */
+export async function preview(libraryId, params, signal) {
+  const response = await request("POST", "/v1/flocks/preview", { body: { library_id: libraryId, ...params }, accept: PLAN, signal });
+  return decodePlan(await response.arrayBuffer());
+}
+
+/** Returns the plan of a flock that was made. @param {string} flockId @param {AbortSignal} [signal] */
+export async function planOf(flockId, signal) {
+  return decodePlan(await (await request("GET", `/v1/flocks/${flockId}/flock.plan`, { signal })).arrayBuffer());
+}
+
+/**
+ * @typedef {{node: HTMLElement, canvas: HTMLCanvasElement, player: any, atlas: any, readonly plan: any,
+ *   show: (plan: any) => void, showSource: (source: any) => void}} Living `show` swaps to another plan
+ */
+
+/**
+ * Shows a flock in a canvas until `life` ends.
+ * @param {{libraryId: string, plan: any, life: AbortSignal, small?: boolean, pictures?: Promise<[any, ImageBitmap]>, onFrame?: (frame: number) => void, onState?: (isPlaying: boolean) => void}} options
+ *   `small` loads the small sheet of the atlas, for little canvases and phones; `pictures` are under way already
+ * @returns {Promise<Living>}
+ */
+export async function living({ libraryId, plan, life, small = false, pictures = loadPictures(libraryId, { life, small }), onFrame, onState }) {
+  const canvas = element("canvas", { role: "img" });
+  canvas.style.aspectRatio = plan.sizePx.join(" / ");
+  const [atlas, picture] = await pictures;
+  /** @type {any} */
+  let player = null;
+  const drawer = await createDrawer(canvas, sceneOf(plan, atlas, picture), { onResize: () => player?.redraw() });
+  player = createPlayer(drawer, planSource(plan, atlas), { onFrame, onState });
+  const detach = attach(canvas, player);
+  const tell = async () => canvas.setAttribute("aria-label", await sentence(plan, player.frame));
+  tell();
+  const telling = setInterval(tell, DESCRIBE_MS);
+  life.addEventListener("abort", () => { clearInterval(telling); detach(); drawer.dispose(); atlas.close(); });
+  const showSource = (/** @type {any} */ source) => player.swap(source);
+  return {
+    node: element("div.living", {}, canvas), canvas, player, atlas, showSource,
+    get plan() { return plan; },
+    show(next) {
+      plan = next;
+      drawer.setScene(sceneOf(plan, atlas, picture));
+      showSource(planSource(plan, atlas));
+      tell();
+    },
+  };
+}
+
+/**
+ * Loads what a living flock is drawn with: the atlas and the background.
+ * @param {string} libraryId @param {{life: AbortSignal, small?: boolean}} options @returns {Promise<[any, ImageBitmap]>}
+ */
+export function loadPictures(libraryId, { life, small = false }) {
+  const base = `/v1/libraries/${libraryId}/`;
+  const pictures = Promise.all([loadAtlas(base, { small, signal: life }), loadPicture(`${base}background.png`, life)]);
+  pictures.catch(() => {});
+  return pictures;
+}
+
+/** @param {string} address @param {AbortSignal} signal */
+async function loadPicture(address, signal) {
+  return createImageBitmap(await (await request("GET", address, { signal })).blob());
+}
+
+/** Returns what a frame shows as a sentence. @param {any} plan @param {number} frame */
+async function sentence(plan, frame) {
+  const { factsOf } = await import("../flock/describe.js");
+  const { n, heading, isResting, nGroups } = factsOf(plan, frame);
+  const motion = isResting ? say("living.rest") : heading === null ? say("living.all_ways") : say("living.heading", { direction: say(`direction.${heading}`) });
+  return [say("living.n", { n }), motion, say("living.groups", { n: nGroups })].join(", ");
+}
+
+/** Returns the data that play mode needs. @param {string} libraryId @param {AbortSignal} life */
+export async function filmOf(libraryId, life) {
+  const [library, poses] = await Promise.all(["library", "poses"].map((name) => get(`/v1/libraries/${libraryId}/${name}.json`, life)));
+  return { library, poses };
+}

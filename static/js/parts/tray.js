@@ -1,0 +1,124 @@
+// The tray of jobs: what runs, how far it is, and buttons to cancel, open, mend or retry.
+// @ts-check
+import { byId, element } from "../app/element.js";
+import { addressOf, cancel, isUnderWay, jobs, uploads } from "../app/jobs.js";
+import { subjectOf } from "../app/names.js";
+import { ago, percent, say, size, stageOf } from "../app/words.js";
+import { fileButton, measure } from "./drop.js";
+import { mendsOf } from "./mend.js";
+import { problemBox } from "./problem.js";
+
+/** Number of ended jobs in the tray; the place of all jobs shows more. */
+const ENDED = 4;
+
+/** Fills the tray and keeps it up to date. */
+export function fillTray() {
+  const tray = byId("tray");
+  const list = element("div.tray-list");
+  const close = element("button.quiet", { type: "button", onclick: () => tray.hidePopover() }, say("close"));
+  tray.append(element("div.tray-head", {}, element("h2", {}, say("tray.title")), close), list, element("a", { href: "/jobs" }, say("tray.all")));
+  // A link inside leads away from what the tray covers.
+  tray.addEventListener("click", (/** @type {any} */ event) => { if (event.target.closest("a[href]")) tray.hidePopover(); });
+  const draw = () => {
+    const running = jobs.value.filter(isUnderWay);
+    const sending = uploads.value.filter((one) => one.state !== "done");
+    const shown = [...running, ...jobs.value.filter((job) => !isUnderWay(job)).slice(0, ENDED)];
+    reconcile(list, [...sending.map((one) => ({ key: `upload-${one.id}`, draw: uploadCard, of: one })), ...shown.map((job) => ({ key: job.id, draw: jobCard, of: job }))]);
+    if (!list.childElementCount) list.append(element("p.soft", {}, say("tray.empty")));
+  };
+  jobs.watch(draw);
+  uploads.watch(draw);
+}
+
+/**
+ * Keeps one element per entry, updates it, and removes those of former entries. Focus and open parts stay.
+ * @param {Element} list @param {{key: string, draw: (of: any) => any, of: any}[]} entries
+ */
+export function reconcile(list, entries) {
+  const old = new Map([...list.children].map((node) => [/** @type {any} */ (node).key, node]));
+  const nodes = entries.map(({ key, draw, of }) => {
+    const node = /** @type {any} */ (old.get(key)) ?? Object.assign(draw(of), { key });
+    node.update?.(of);
+    return node;
+  });
+  if (nodes.some((node, idx) => list.children[idx] !== node) || list.childElementCount !== nodes.length) list.replaceChildren(...nodes);
+}
+
+/** Returns the card of a job. Its `update` shows a newer state. @param {any} job */
+export function jobCard(job) {
+  const name = element("strong");
+  const stage = element("span.job-stage", { role: "status" });
+  const bar = element("progress", { max: 1, "aria-label": say("job.progress") });
+  const more = element("p.soft");
+  const actions = element("p.actions");
+  const problem = element("div");
+  const thumb = element("img.job-thumb", { alt: "", width: 64, height: 48, hidden: true });
+  const card = element("article.job", {}, thumb, element("div.job-body", {}, element("div.job-line", {}, name, stage), bar, more, problem, actions));
+  let drawn = "";
+  const tellSubject = async (/** @type {any} */ seen) => {
+    const film = await subjectOf(seen);
+    name.textContent = say(`job.${job.kind}`, { film: film.name });
+    thumb.hidden = !film.poster;
+    if (film.poster) thumb.src = film.poster;
+    if (drawn.startsWith(seen.state)) actions.replaceChildren(...buttonsOf(seen, film));
+  };
+  card.update = (/** @type {any} */ seen) => {
+    bar.value = seen.progress ?? 0;
+    bar.hidden = !isUnderWay(seen);
+    stage.textContent = seen.state === "running" ? `${stageOf(seen)} · ${percent(seen.progress ?? 0)}` : stageOf(seen);
+    more.textContent = isUnderWay(seen) ? [leftText(seen), seen.attempt > 1 ? say("job.restarted", { n: seen.attempt }) : ""].filter(Boolean).join(" ") : ago(seen.finished_at ?? seen.created_at);
+    more.hidden = !more.textContent;
+    const state = `${seen.state} ${seen.cancel_requested}`;
+    if (state === drawn) return;
+    drawn = state;
+    card.dataset.state = seen.state;
+    const mends = seen.kind === "analysis" ? mendsOf(seen.error ?? {}, (params) => measure(seen.subject.id, params, { show: true })) : [];
+    problem.replaceChildren(...(seen.state === "failed" ? [problemBox(seen.error ?? {}, mends)] : []));
+    actions.replaceChildren(...buttonsOf(seen));
+    tellSubject(seen);
+  };
+  return card;
+}
+
+/** @param {any} job @param {{isGone: boolean}} [film] what the job works on, once it is known */
+function buttonsOf(job, film) {
+  if (isUnderWay(job)) {
+    const stop = (/** @type {any} */ event) => { event.target.disabled = true; cancel(job.id).catch(() => { event.target.disabled = false; }); };
+    return [element("button.quiet", { type: "button", disabled: job.cancel_requested, onclick: stop }, say("cancel"))];
+  }
+  if (!film || film.isGone) return [];
+  if (job.state === "done") return job.kind === "sample" ? [] : [element("a.button.quiet", { href: addressOf(job) }, say("job.open"))];
+  if (job.kind === "analysis") return [element("button.quiet", { type: "button", onclick: () => measure(job.subject.id, {}, { show: true }) }, say("job.again")), element("a.button.quiet", { href: `/films/${job.subject.id}` }, say("job.film"))];
+  return job.kind === "flock" ? [element("a.button.quiet", { href: `/libraries/${job.subject.id}/studio` }, say("film.studio"))] : [];
+}
+
+/** Returns the time left as text, estimated from the progress since the job began. @param {any} job */
+export function leftText(job) {
+  const elapsed_s = (Date.now() - Date.parse(job.started_at ?? "")) / 1000;
+  if (job.state !== "running" || !(job.progress > 0.05) || !(elapsed_s > 2)) return "";
+  const left_s = Math.max(1, elapsed_s / job.progress - elapsed_s);
+  return say("job.left", { time: left_s < 90 ? say("unit.seconds", { n: Math.round(left_s) }) : say("unit.minutes", { n: Math.round(left_s / 60) }) });
+}
+
+/** Returns the card of an upload. @param {any} upload */
+function uploadCard(upload) {
+  const name = element("strong", {}, upload.name);
+  const stage = element("span.job-stage", { role: "status" });
+  const bar = element("progress", { max: 1, "aria-label": say("job.progress") });
+  const more = element("p.soft");
+  const problem = element("div");
+  const stop = element("button.quiet", { type: "button", onclick: () => upload.cancel() });
+  const again = upload.state === "paused" && fileButton(say("home.choose"));
+  const film = upload.address && element("video.job-thumb", { src: upload.address, muted: true, preload: "metadata", "aria-hidden": "true", onerror: () => film.remove() });
+  const card = element("article.job", {}, film, element("div.job-body", {}, element("div.job-line", {}, name, stage), bar, more, problem, element("p.actions", {}, again, stop)));
+  card.update = (/** @type {any} */ seen) => {
+    bar.value = seen.total ? seen.sent / seen.total : 0;
+    bar.hidden = seen.state !== "sending";
+    stage.textContent = say(`upload.${seen.state}`);
+    more.textContent = seen.state === "sending" ? say("upload.of", { sent: size(seen.sent), total: size(seen.total) }) : seen.state === "paused" ? say("upload.choose") : "";
+    more.hidden = !more.textContent;
+    stop.textContent = say(seen.state === "failed" ? "dismiss" : "cancel");
+    if (seen.state === "failed" && !problem.childElementCount) problem.replaceChildren(problemBox(seen.problem));
+  };
+  return card;
+}

@@ -1,0 +1,101 @@
+// The place of all films: what is known of each, search, delete.
+// @ts-check
+import { list } from "../app/api.js";
+import { element } from "../app/element.js";
+import { isUnderWay, jobs } from "../app/jobs.js";
+import { filmName } from "../app/names.js";
+import { setTitle } from "../app/router.js";
+import { percent, say, stageOf } from "../app/words.js";
+import { filmCard } from "../parts/cards.js";
+import { fileButton } from "../parts/drop.js";
+import { problemBox } from "../parts/problem.js";
+import { deleted, deleteLater } from "../parts/undo.js";
+
+/** Films of a page. */
+const PAGE = 30;
+
+/** @typedef {{film: any, node: HTMLElement, state: HTMLElement}} Entry */
+
+/** @param {HTMLElement} root @param {import("../app/router.js").Visit} visit */
+export async function show(root, { life }) {
+  setTitle(say("films.title"));
+  const search = element("input", { type: "search", placeholder: say("films.search"), "aria-label": say("films.search"), oninput: () => sift() });
+  const cards = element("ul.cards");
+  const more = element("button.quiet", { type: "button", hidden: true, onclick: () => fill().catch(tell) }, say("more"));
+  const empty = element("div.empty", { hidden: true }, element("p", {}, say("films.empty")), element("p.actions", {}, fileButton(say("home.choose"))));
+  const found = element("p.soft", { role: "status" });
+  const trouble = element("div");
+  root.append(element("header.place-head", {}, element("h1", { tabIndex: -1 }, say("films.title")), element("div.actions", {}, search, fileButton(say("home.choose")))),
+    element("p.soft.narrow", {}, say("films.help")), found, trouble, empty, cards, element("p", {}, more));
+  /** @type {Entry[]} */
+  let all = [];
+  /** @type {any[]} */
+  let libraries = [];
+  /** @type {string | null} */
+  let next = `/v1/footage?limit=${PAGE}`;
+  const tell = (/** @type {any} */ problem) => { if (!life.aborted) trouble.replaceChildren(problemBox(problem)); };
+
+  /** @param {any} film @returns {Entry} */
+  const entry = (film) => {
+    const state = element("p.film-state");
+    const name = filmName(film);
+    const drop = element("button.quiet.small", { type: "button", "aria-label": say("reels.delete.of", { name }), onclick: () => deleteLater({ id: film.id, path: `/v1/footage/${film.id}`, name }).focus() }, say("film.delete"));
+    const node = filmCard(film, { library: libraries.find((library) => library.footage_id === film.id), state: element("div.film-foot", {}, state, drop) });
+    return { film, node, state };
+  };
+  const sift = () => {
+    const wanted = search.value.trim().toLocaleLowerCase();
+    const kept = all.filter(({ film }) => !deleted.value.has(film.id));
+    const fit = kept.filter(({ film }) => filmName(film).toLocaleLowerCase().includes(wanted));
+    for (const one of all) one.node.hidden = !fit.includes(one);
+    more.hidden = !next;
+    found.textContent = wanted ? say("films.found", { n: fit.length }) : "";
+    found.hidden = !wanted;
+    empty.hidden = Boolean(wanted || kept.length || next);
+    search.hidden = all.length < 2;
+  };
+  /** Shows the state of each film that is newer than its card. */
+  const tellStates = () => {
+    for (const { film, state, node } of all) {
+      const mine = jobs.value.filter((job) => job.kind === "analysis" && job.subject?.id === film.id);
+      const job = mine.find(isUnderWay) ?? mine[0];
+      const isMeasured = libraries.some((library) => library.footage_id === film.id);
+      node.dataset.state = job && isUnderWay(job) ? "running" : isMeasured ? "measured" : job?.state === "failed" ? "refused" : "bare";
+      state.textContent = job && isUnderWay(job) ? `${stageOf(job)} · ${percent(job.progress ?? 0)}` : isMeasured ? say("film.measured") : job?.state === "failed" ? job.error?.title ?? say("state.failed") : say("film.not_measured");
+    }
+  };
+  const fill = async () => {
+    if (!next) return;
+    const [page, measured] = await Promise.all([list(next, life), list("/v1/libraries?limit=100", life)]);
+    libraries = measured.items;
+    const made = page.items.filter((film) => !all.some((one) => one.film.id === film.id)).map(entry);
+    all.push(...made);
+    cards.append(...made.map(({ node }) => node));
+    next = page.next;
+    sift();
+    tellStates();
+  };
+  /** Shows films and measurements that came meanwhile. */
+  const refresh = async () => {
+    const [page, measured] = await Promise.all([list(`/v1/footage?limit=${PAGE}`, life), list("/v1/libraries?limit=100", life)]);
+    const fresh = measured.items.filter((library) => !libraries.some((one) => one.id === library.id)).map((library) => library.footage_id);
+    libraries = measured.items;
+    const isOld = (/** @type {Entry} */ one) => fresh.includes(one.film.id);
+    all = all.map((one) => { if (!isOld(one)) return one; const next = entry(one.film); one.node.replaceWith(next.node); return next; });
+    const made = page.items.filter((film) => !all.some((one) => one.film.id === film.id)).map(entry);
+    all.unshift(...made);
+    cards.prepend(...made.map(({ node }) => node));
+    sift();
+    tellStates();
+  };
+  deleted.watch(sift, life);
+  await fill();
+  let known = "";
+  jobs.watch((every) => {
+    tellStates();
+    // A new job may be of a new film, a done one makes a library.
+    const now = every.filter((job) => job.kind !== "flock").map((job) => job.id + (job.state === "done")).join();
+    if (known && now !== known) refresh().catch(() => {});
+    known = now || "none";
+  }, life);
+}

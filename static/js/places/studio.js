@@ -1,0 +1,130 @@
+// The studio: a flock swims while its settings change. The settings are the query of the address, so a link is a flock.
+// @ts-check
+import { list } from "../app/api.js";
+import { element } from "../app/element.js";
+import { filmName, thing } from "../app/names.js";
+import { go, replaceAddress, setTitle } from "../app/router.js";
+import { signal } from "../app/store.js";
+import { say } from "../app/words.js";
+import { fileButton } from "../parts/drop.js";
+import { timeline } from "../parts/timeline.js";
+import { factsBox, orderOf } from "../studio/facts.js";
+import { maker } from "../studio/make.js";
+import { overlay } from "../studio/overlay.js";
+import { panel } from "../studio/panel.js";
+import { placedOf } from "../studio/placed.js";
+import { createPlanner } from "../studio/planner.js";
+import { loadFields } from "../studio/schema.js";
+import { at, createSettings, readQuery, writeQuery } from "../studio/settings.js";
+import { share } from "../studio/share.js";
+import { stage } from "../studio/stage.js";
+import { thingsList } from "../studio/things-list.js";
+import { toolbar } from "../studio/toolbar.js";
+import { problemBox } from "../parts/problem.js";
+
+/** @param {HTMLElement} root @param {import("../app/router.js").Visit} visit */
+export async function show(root, { id, query, life }) {
+  const loading = loadFields();
+  loading.catch(() => {});
+  if (id) thing("libraries", id).catch(() => {});
+  const libraries = (await list("/v1/libraries?limit=50", life)).items;
+  if (!id && !libraries.length) return showEmpty(root);
+  const libraryId = id || libraries[0].id;
+  const [library, fields] = await Promise.all([thing("libraries", libraryId), loading]);
+  const film = { fps: library.fps, size: library.image_size_px };
+  const { settings: start, unknown } = readQuery(query, fields);
+  const settings = createSettings(start);
+  const tool = signal("");
+  let [moment, planned] = [query.get("t"), /** @type {{plan: any, settings: any}} */ ({ plan: null, settings: {} })];
+
+  /** The value in force: the person's, else that of the plan, else the default. @param {string} name */
+  const valueOf = (name) => {
+    if (name in settings.now.value) return settings.now.value[name];
+    const told = planned.plan && !(name in planned.settings) ? at(planned.plan.head.params, name) : undefined;
+    return told === undefined ? fields.get(name)?.default : told;
+  };
+  const placed = () => placedOf(valueOf);
+  const n = () => valueOf("count") ?? planned.plan?.nIndividuals ?? 20;
+  const length_s = () => (valueOf("frames") ?? 400) / film.fps;
+  const query_of = () => writeQuery(settings.now.value);
+  const address = () => `/libraries/${libraryId}/studio${query_of() && `?${query_of()}`}`;
+  const tellAddress = () => replaceAddress(moment === null ? address() : `${address()}${query_of() ? "&" : "?"}t=${moment}`);
+
+  const time = timeline({ life, seek: (frame) => view.seek(frame), toggle: () => view.toggle(), onScrub: (time_s) => { moment = time_s.toFixed(2); tellAddress(); } });
+  const view = stage({ libraryId, size: film.size, life, tool, startFrame: moment === null ? null : Math.round(Number(moment) * film.fps) || 0,
+    onFrame: (frame) => { time.setFrame(frame); layer.mark(view.plan, frame); },
+    onState: (isPlaying) => { time.setPlaying(isPlaying); if (isPlaying && moment !== null) { moment = null; tellAddress(); } },
+    onPath: (path) => settings.change({ predator: { ...placed().predator, path } }), length_s });
+  const layer = overlay({ canvas: view.canvas, size: film.size, life, tool, placed, length_s, change: settings.change, onSelect: (key) => things.select(key) });
+  const side = panel({ fields, change: settings.change, valueOf, film, formats: fields.get("render.formats")?.choices ?? [] });
+  const things = thingsList({ node: side.things, placed, change: settings.change, layer, tool });
+  const tools = toolbar({ tool, life, add: layer.add, undo: settings.undo, redo: settings.redo, compare: (isOn) => view.compare(isOn ? settings.before : null, planner) });
+  view.put(layer.node, tools.hint);
+  const facts = factsBox();
+  const ways = share(library);
+  const again = element("button.quiet.again", { type: "button", title: say("studio.again.help"), onclick: () => settings.change(Object.fromEntries(Object.keys(settings.now.value).map((name) => [name, undefined])), { step: "all" }) }, element("span.sign", { "aria-hidden": "true" }, "↺"), element("span", {}, say("studio.again")));
+  const trouble = element("div.trouble");
+  view.node.append(trouble);
+  const place = element("section.studio-view", { "aria-label": say("studio.view") }, tools.node, view.node, time.node);
+  const below = element("div.studio-about");
+  // On a phone the picture stays in sight above the settings, so it has room for nothing else.
+  const isWide = matchMedia("(min-width: 48rem)");
+  const lay = () => (isWide.matches ? place : below).append(facts.node);
+  isWide.addEventListener("change", lay, { signal: life });
+  lay();
+  setTitle(say("studio.title", { film: filmName(library) }));
+  root.append(
+    element("header.place-head", {}, element("div.studio-title", {}, element("h1", { tabIndex: -1 }, say("studio.title", { film: filmName(library) })), element("a", { href: `/libraries/${libraryId}` }, say("studio.desk"))),
+      element("p.actions", {}, animals(libraries, libraryId, query_of), again, tools.acts)),
+    unknown.length > 0 && element("p.advice-line", {}, say("studio.unknown", { names: unknown.join(", ") })) || "",
+    element("div.studio", {},
+      place,
+      element("section.studio-panel", { "aria-label": say("studio.panel") }, side.node, maker({ libraryId, settings: () => settings.now.value, life, beside: ways.button }).node, ways.node),
+      below));
+
+  const planner = createPlanner({
+    libraryId, life, onBusy: view.setBusy,
+    onPlan(plan, of) {
+      planned = { plan, settings: of };
+      trouble.replaceChildren();
+      view.show(plan).catch((problem) => { if (!life.aborted) trouble.replaceChildren(problemBox(problem)); });
+      time.setSpan(Math.max(plan.nFrames, plan.head.params.frames ?? 0), plan.fps);
+      refresh();
+      if (plan.isFirst) return;
+      time.setSeries(plan.nIndividuals > 1 ? { name: say("facts.series"), values: orderOf(plan), most: 1 } : null);
+      facts.update(plan);
+    },
+    onProblem: (problem) => {
+      if (view.plan) view.show(view.plan);
+      trouble.replaceChildren(problemBox(problem, settings.canUndo ? [{ label: say("tool.undo"), act: settings.undo }] : [{ label: say("studio.again"), act: () => again.click() }]));
+    },
+  });
+  function refresh() {
+    side.update(settings.now.value, n());
+    layer.draw();
+    things.draw();
+    tools.update(settings);
+    ways.update(settings.now.value, location.origin + address());
+    again.hidden = Object.keys(settings.now.value).length === 0;
+  }
+  settings.now.watch(() => {
+    tellAddress();
+    refresh();
+    planner.ask(settings.now.value, settings.before);
+  }, life);
+  tool.watch(() => things.draw(), life);
+}
+
+/** The choice of the animal, if there are several. @param {any[]} libraries @param {string} libraryId @param {() => string} query */
+function animals(libraries, libraryId, query) {
+  const options = libraries.map((one) => element("option", { value: one.id, selected: one.id === libraryId }, filmName(one)));
+  const choose = element("select.animals", { "aria-label": say("studio.animal"), onchange: () => go(`/libraries/${choose.value}/studio?${query()}`) }, ...options);
+  choose.hidden = libraries.length < 2;
+  return choose;
+}
+
+/** @param {HTMLElement} root */
+function showEmpty(root) {
+  setTitle(say("nav.studio"));
+  root.append(element("h1", { tabIndex: -1 }, say("nav.studio")), element("p", {}, say("studio.empty")), element("p.actions", {}, fileButton(say("home.choose"))));
+}

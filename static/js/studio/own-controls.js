@@ -1,0 +1,101 @@
+// Settings with controls of their own: preset, background, size, files, seed.
+// @ts-check
+import { element } from "../app/element.js";
+import { say, sayOr } from "../app/words.js";
+import { choiceOf, framed, nameOf } from "./control.js";
+import { CLEAR } from "./ways.js";
+
+/** @typedef {import("./control.js").Control} Control @typedef {import("./control.js").Studio} Studio */
+
+/** Sizes that editors ask for. */
+const SIZES = [[1280, 720], [1920, 1080], [1080, 1920], [1080, 1080]];
+
+/** @param {string} name @param {string} value @param {string} label @param {() => void} choose */
+const radio = (name, value, label, choose) => {
+  const input = element("input", { type: "radio", name, value, onchange: choose });
+  return { input, node: element("label.chip", {}, input, element("span", {}, label)) };
+};
+
+/** Buttons for the behaviors. @param {Studio} studio */
+export function presets(studio) {
+  const all = (studio.fields.get("preset")?.choices ?? []).map((name) => radio("preset", name, choiceOf("preset", name), () => studio.change({ preset: name })));
+  const help = element("p.soft");
+  return {
+    node: element("fieldset.presets", {}, element("legend", {}, nameOf("preset")), element("div.chips", {}, ...all.map(({ node }) => node)), help),
+    update(/** @type {string | undefined} */ name) {
+      for (const { input } of all) input.checked = input.value === (name ?? "school");
+      help.textContent = sayOr(`preset.${name ?? "school"}`, "");
+    },
+  };
+}
+
+/** @param {import("./schema.js").Field} field @param {Studio} studio @returns {Control} */
+export function seed(field, studio) {
+  const input = element("input.number", { type: "number", min: 0, step: 1 });
+  const dice = element("button.small-button", { type: "button", title: say("set.dice"), "aria-label": say("set.dice"), onclick: () => studio.change({ seed: 1 + Math.floor(Math.random() * 9999) }) }, "⚄");
+  input.addEventListener("input", () => { if (input.validity.valid && input.value) studio.change({ seed: Number(input.value) }); });
+  const { node, setReset } = framed(field, studio, { input });
+  input.before(dice);
+  return { node, name: "seed", update(value, { isSet }) { if (document.activeElement !== input) input.value = String(value ?? 1); setReset(isSet); } };
+}
+
+/** Plate, transparent or a color. @param {import("./schema.js").Field} field @param {Studio} studio @param {(name: string) => any} valueOf @returns {Control} */
+export function background(field, studio, valueOf) {
+  const color = element("input.color", { type: "color", value: "#103040", "aria-label": say("set.background.color.pick") });
+  const choose = (/** @type {string} */ what) => {
+    const formats = valueOf("render.formats") ?? [];
+    // Video.mp4 has no transparency: at least one file shall have it.
+    const more = what === "transparent" && !formats.some((/** @type {string} */ one) => CLEAR.includes(one)) ? { "render.formats": [...formats, "webm"] } : {};
+    studio.change({ "render.background": what === "plate" ? undefined : what === "color" ? color.value : what, ...more });
+  };
+  const all = ["plate", "transparent", "color"].map((what) => radio("background", what, say(`set.background.${what}`), () => choose(what)));
+  color.addEventListener("input", () => choose("color"));
+  const note = element("p.soft", { hidden: true }, say("set.background.note"));
+  const { node, setReset } = framed(field, studio, { input: null, below: element("div.chips", { role: "radiogroup", "aria-label": nameOf(field.name) }, ...all.map((one) => one.node), color) });
+  node.append(note);
+  return {
+    node, name: field.name,
+    update(value, { isSet }) {
+      const isColor = String(value).startsWith("#");
+      for (const { input } of all) input.checked = input.value === (isColor ? "color" : value ?? "plate");
+      if (isColor) color.value = value;
+      color.hidden = !isColor;
+      note.hidden = value !== "transparent";
+      setReset(isSet);
+    },
+  };
+}
+
+/** @param {import("./schema.js").Field} field @param {Studio} studio @param {number[]} film width and height @returns {Control} */
+export function size(field, studio, film) {
+  const sizes = [film.map((side) => side * 2), film.map((side) => Math.round(side / 2)), ...SIZES].filter((one) => one.every((side) => side >= 16 && side <= 8192) && one[0] * one[1] <= 8_294_400);
+  const input = element("select", { onchange: () => studio.change({ [field.name]: input.value === "film" ? undefined : input.value.split(",").map(Number) }) });
+  const option = (/** @type {number[]} */ one) => element("option", { value: one.join() }, one.join(" × "));
+  input.append(element("option", { value: "film" }, say("set.size.film", { size: film.join(" × ") })), ...sizes.map(option));
+  const { node, setReset } = framed(field, studio, { input });
+  return {
+    node, name: field.name,
+    update(value, { isSet }) {
+      const text = Array.isArray(value) ? value.join() : "film";
+      if (![...input.options].some((one) => one.value === text)) input.append(option(value));
+      input.value = text;
+      setReset(isSet);
+    },
+  };
+}
+
+/** Files besides video.mp4. @param {import("./schema.js").Field} field @param {Studio} studio @param {string[]} formats @returns {Control} */
+export function files(field, studio, formats) {
+  const all = formats.filter((one) => one !== "mp4").map((name) => {
+    const input = element("input", { type: "checkbox", value: name, onchange: () => studio.change({ [field.name]: all.filter((one) => one.input.checked).map((one) => one.name) }) });
+    return { name, input, node: element("label.check", {}, input, element("span", {}, choiceOf("format", name))) };
+  });
+  const { node, setReset } = framed(field, studio, { input: null, below: element("div.checks", { role: "group", "aria-label": nameOf(field.name) }, ...all.map((one) => one.node)) });
+  return {
+    node, name: field.name,
+    update(value, { isSet }) {
+      for (const { name, input } of all) input.checked = Array.isArray(value) && value.includes(name);
+      setReset(isSet);
+    },
+  };
+}

@@ -1,0 +1,2 @@
+// Resumable uploads (tus protocol 1.0).
+export { Upload } from "tus-js-client";
