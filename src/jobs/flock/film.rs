@@ -161,7 +161,7 @@ impl Film<'_> {
         Ok(sink::poster(&target.path, size_px, self.is_clear(), &rgba)?)
     }
 
-    /// Writes the middle frame as a small WebP for lists, at most [`MAX_THUMB_BYTES`] long.
+    /// Writes the middle frame as a small WebP for lists, at most `MAX_THUMB_BYTES` long.
     pub fn thumb(&self, path: &Path) -> Result<(), Error> {
         let (size_px, rgba) = self.middle_frame()?;
         for quality in THUMB_QUALITIES {
