@@ -2,7 +2,7 @@
 
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::store::tokens::Scope;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::common::TestApp;
 use crate::common::app::code_of;
@@ -36,10 +36,10 @@ async fn metrics_cover_the_queue_the_store_requests_and_ended_jobs() {
     }
     let worker = Worker::new(app.context.clone());
     assert!(matches!(worker.step().await.unwrap(), Step::Failed(..)));
-    app.get(&format!("/v1/footage/{footage}"))
-        .send()
-        .await
-        .unwrap();
+    let answer = app.get(&format!("/v1/footage/{footage}")).send().await;
+    let described: Value = answer.unwrap().json().await.unwrap();
+    let footage_bytes = described["size_bytes"].as_f64().unwrap();
+    assert!(footage_bytes > TINY.len() as f64, "with the poster");
     app.get("/v1/footage/no-id").send().await.unwrap();
     app.get(&format!("/nowhere/{footage}"))
         .send()
@@ -50,10 +50,7 @@ async fn metrics_cover_the_queue_the_store_requests_and_ended_jobs() {
         ("flockreel_jobs{kind=\"analysis\",state=\"queued\"}", 1.0),
         ("flockreel_jobs{kind=\"analysis\",state=\"failed\"}", 1.0),
         ("flockreel_jobs{kind=\"fish\",state=\"running\"}", 0.0),
-        (
-            "flockreel_stored_bytes{noun=\"footage\"}",
-            TINY.len() as f64,
-        ),
+        ("flockreel_stored_bytes{noun=\"footage\"}", footage_bytes),
         (
             "flockreel_http_requests_total{route=\"/v1/footage/{id}\",method=\"GET\",status=\"200\"}",
             1.0,
