@@ -106,7 +106,8 @@ async fn backup_during_writes_is_a_complete_service() {
     assert_eq!(check.status.code(), Some(0), "{}", said(&check));
     assert!(!films.path("copy.partial").exists());
     let restored = Server::start(&films.path("copy"));
-    let stored = every_film_is_whole(&restored.base, copied["files"].as_u64().unwrap()).await;
+    let n_films = copied["files"].as_u64().unwrap() / 2; // each film has a poster
+    let stored = every_film_is_whole(&restored.base, n_films).await;
     let lost: Vec<_> = before.iter().filter(|id| !stored.contains(id)).collect();
     assert!(lost.is_empty(), "stored before the backup: {lost:?}");
     let ended = client().post(format!("{}/v1/footage", restored.base));

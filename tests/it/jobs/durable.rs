@@ -81,13 +81,15 @@ async fn upload_is_on_disk_before_its_201() {
     assert_eq!(answer.status(), 201);
     let footage: serde_json::Value = answer.json().await.unwrap();
     let calls = traced.calls("/data/tmp/", "HTTP/1.1 201");
-    let renamed = calls.iter().find(|call| call.contains(" rename"));
-    let draft = draft_of(renamed.expect("the film is renamed into place"));
     let folder = format!("blobs/footage/{}", footage["id"].as_str().unwrap());
+    let mut renames = calls.iter().filter(|call| call.contains(" rename"));
+    let renamed = renames.find(|call| call.contains(&folder));
+    let draft = draft_of(renamed.expect("the film is renamed into place"));
     assert_in_order(
         &calls,
         &[
             ("fsync(", &format!("{draft}/video>")),
+            ("fsync(", &format!("{draft}/poster.jpg>")),
             ("fsync(", &format!("{draft}>")),
             ("rename", &folder),
             ("fsync(", "/data/blobs/footage>"),
