@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench measure accuracy flocks papers service transitions ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -115,7 +115,7 @@ bench: build target/bench-venv/ready ## measure the speed against ffmpeg, OpenCV
 	$(BENCH) bench/reproduce.py $(RELEASE) target/demo/library target/demo/footage.mp4
 
 # The figures of bench/results. Each of these targets also writes docs/measurements.md.
-measure: accuracy flocks papers service transitions ## write docs/measurements.md: make measure GENERATOR=goldfish.py FOOTAGE=folder
+measure: accuracy flocks papers service transitions page-bench ## write docs/measurements.md: make measure GENERATOR=goldfish.py FOOTAGE=folder
 	$(BENCH) bench/measurements.py
 
 accuracy: build target/bench-venv/ready ## compare poses with the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program]
@@ -133,6 +133,17 @@ service: build target/bench-venv/ready ## compare the speed of the service with 
 
 transitions: target/bench-venv/ready ## measure how the search for transitions grows with the film
 	$(BENCH) bench/transitions.py --most 50000 --write
+
+page-bench: vendor build target/bench-venv/ready ## measure the page in Chromium
+	@scripts/system-packages.sh page-test
+	@scripts/venv.sh target/page-venv tests/page/requirements.txt
+	target/page-venv/bin/python bench/page.py $(RELEASE)
+	$(BENCH) bench/measurements.py
+
+screenshots: vendor build ## make pictures of every place of the page and a recording, in target/screenshots
+	@scripts/system-packages.sh page-test
+	@scripts/venv.sh target/page-venv tests/page/requirements.txt
+	target/page-venv/bin/python -B scripts/screenshots.py $(RELEASE) target/screenshots
 
 ablation: target/vendor target/bench-venv/ready ## switch off each rule of the measurement once: make ablation GENERATOR=goldfish.py [FOOTAGE=folder]
 	$(BENCH) bench/ablation.py $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))

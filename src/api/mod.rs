@@ -136,7 +136,7 @@ pub fn router(state: AppState) -> Router {
         .merge(openapi::route(&document))
         .merge(docs::routes())
         .merge(page::routes())
-        .fallback(|| async { Problem::from(Code::NotFound) })
+        .fallback(page::get_missing)
         .method_not_allowed_fallback(|| async { Problem::from(Code::MethodNotAllowed) })
         .with_state(state.clone())
         .layer(middleware::from_fn_with_state(

@@ -65,7 +65,7 @@ def test_back_and_forward_go_through_places_with_their_titles(page, filled_servi
 
 
 def test_addresses_of_nothing_say_so(page, filled_service):
-    for path in ("/films/nowhere", "/libraries/nowhere", "/libraries/nowhere/studio", f"/flocks/{'0' * 8}-0000-7000-8000-{'0' * 12}"):
+    for path in ("/nowhere", "/films/nowhere", "/libraries/nowhere", "/libraries/nowhere/studio", f"/flocks/{'0' * 8}-0000-7000-8000-{'0' * 12}"):
         page.goto(filled_service + path)
         expect(heading(page)).to_have_text(say(page, "missing.title"))
         expect(page).to_have_title(re.compile(".+ · flockreel"))

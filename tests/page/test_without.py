@@ -88,6 +88,7 @@ def test_five_hundred_flocks_are_listed_page_by_page(page, filled_service):
         route.fulfill(json={"items": flocks[first:end], "next_cursor": str(end) if end < len(flocks) else None})
 
     page.route("**/v1/flocks?*", answer)
+    page.route("**/thumb.webp", lambda route: route.fulfill(body=""))
     page.goto(f"{filled_service}/flocks")
     cards = page.get_by_role("main").get_by_role("listitem")
     expect(cards.first).to_be_visible(timeout=LOAD_MS)
@@ -148,6 +149,7 @@ def test_a_token_that_may_only_read_is_told_what_it_may_not(page, closed_service
     address, _, data = closed_service
     page.goto(address)
     sign_in(page, token(data, "create", "--name", "reader", "--scope", "read"))
+    expect(page.get_by_role("button", name=say(page, "session.end"))).to_be_visible()
     choose_film(page, other_film)
     expect(open_tray(page).get_by_role("alert")).to_contain_text("scope_too_small", timeout=LOAD_MS)
 

@@ -10,7 +10,7 @@ pub(super) mod openapi; // /openapi.json
 use axum::Router;
 use axum::body::Body;
 use axum::extract::Path;
-use axum::http::{HeaderMap, Response, StatusCode, header};
+use axum::http::{HeaderMap, Method, Response, StatusCode, header};
 use axum::response::IntoResponse;
 use axum::routing::get;
 use rust_embed::{EmbeddedFile, RustEmbed};
@@ -54,6 +54,20 @@ pub(super) fn routes() -> Router<AppState> {
         })
         .route("/static/{*path}", get(get_file::<Static>))
         .route("/vendor/{*path}", get(get_file::<Vendor>))
+}
+
+/// Answers requests for an address that nothing has. A browser gets the page, which says so and shows the way
+/// back; other clients get the problem.
+pub(super) async fn get_missing(method: Method, headers: HeaderMap) -> Response<Body> {
+    let accepted = headers.get(header::ACCEPT);
+    let accepted = accepted.and_then(|accepted| accepted.to_str().ok());
+    let is_browser = accepted.is_some_and(|accepted| accepted.contains("text/html"));
+    if method != Method::GET || !is_browser {
+        return Problem::not_found().into_response();
+    }
+    let page = Static::get("index.html").map(|file| file.data.into_owned());
+    let media_type = [(header::CONTENT_TYPE, media_type("index.html"))];
+    (StatusCode::NOT_FOUND, media_type, page.unwrap_or_default()).into_response()
 }
 
 async fn get_file<Files: RustEmbed>(

@@ -28,6 +28,7 @@ export function setLanguage(tag) {
 const plural = new Intl.PluralRules(language);
 const number = new Intl.NumberFormat(language, { maximumFractionDigits: 1 });
 const whole = new Intl.NumberFormat(language, { maximumFractionDigits: 0 });
+const share = new Intl.NumberFormat(language, { style: "percent", maximumFractionDigits: 0 });
 const date = new Intl.DateTimeFormat(language, { dateStyle: "medium", timeStyle: "short" });
 const relative = new Intl.RelativeTimeFormat(language, { numeric: "auto" });
 
@@ -51,8 +52,8 @@ export const sayOr = (key, other) => (table[key] ? say(key) : other);
 
 /** @param {number} value */
 export const count = (value) => number.format(value);
-/** @param {number} share */
-export const percent = (share) => `${whole.format(100 * share)} %`;
+/** @param {number} part */
+export const percent = (part) => share.format(part);
 /** @param {number} rad */
 export const degrees = (rad) => (rad * 180) / Math.PI;
 /** @param {number} value */

@@ -30,6 +30,11 @@ async fn unknown_paths_and_ids_give_not_found() {
         let answer = app.get(&path).send().await.unwrap();
         assert_eq!(code_of(answer, 404).await, "not_found", "{path}");
     }
+    let visit = app.get("/nowhere").header("accept", "text/html,*/*;q=0.8");
+    let page = visit.send().await.unwrap();
+    assert_eq!(page.status(), 404);
+    assert_eq!(page.headers()["content-type"], "text/html; charset=utf-8");
+    assert!(page.text().await.unwrap().contains("js/main.js"));
     let answer = app.delete("/v1/footage").send().await.unwrap();
     assert_eq!(code_of(answer, 405).await, "method_not_allowed");
     app.assert_sound().await;
