@@ -228,7 +228,7 @@ export default {
   "fish.not_ours": "The 3-D model cannot be read. The film of the fish is shown.",
   "fish.space.label": "3-D view of the virtual fish. {what}. Drag or use the buttons to turn it.", "fish.hidden": "The animal was not seen in this frame, so there is no fish.",
   "fish.heading": "Heading {heading}", "fish.level": "neither toward nor away from the camera", "fish.toward": "{n}° toward the camera", "fish.away": "{n}° away from the camera",
-  "fish.view": "Where you look from", "fish.view.near": "Near it", "fish.view.whole": "Its whole way", "fish.view.filmed": "As filmed",
+  "fish.view": "Where you look from", "fish.view.near": "Near it", "fish.view.whole": "Whole path", "fish.view.filmed": "As filmed",
   "fish.turn": "Turn and zoom", "fish.turn.left": "Turn left", "fish.turn.right": "Turn right", "fish.turn.up": "Turn up", "fish.turn.down": "Turn down", "fish.turn.nearer": "Nearer", "fish.turn.farther": "Farther", "fish.turn.reset": "Reset the view",
   "fish.keys": "Drag to turn, wheel or two fingers to zoom. Keys: Space plays, ← → one frame (with Shift ten), Home and End, + and − zoom, 0 resets the view.", "fish.keys.flat": "Keys: Space plays, ← → one frame (with Shift ten), Home and End.",
   "fish.options": "Another fish", "fish.papers": "As in the paper", "fish.papers.help": "The paper of 2011 has a stiff, upright fish and values that are not smoothed.",

@@ -81,6 +81,19 @@ def cursor_frame(page, first=0, n_frames=150):
     return first + int(x / width * n_frames)
 
 
+def test_a_film_that_was_not_played_shows_its_first_frame(page, library):
+    open_desk(page, library[0])
+    video = page.locator("video")
+    until(page, "document.querySelector('video').readyState >= 2")
+    page.wait_for_timeout(300)
+    first = video.screenshot()
+    for key, frame in (("ArrowRight", 1), ("ArrowLeft", 0)):
+        page.keyboard.press(key)
+        until(page, f"Math.floor(document.querySelector('video').currentTime * {FPS}) === {frame} && !document.querySelector('video').seeking")
+        page.wait_for_timeout(300)
+    assert video.screenshot() == first
+
+
 def test_each_key_shows_its_frame_in_film_plots_and_reading(page, library, numbered_film):
     serve(page, "**/film.mp4", numbered_film, "video/mp4")
     open_desk(page, library[0])

@@ -46,6 +46,8 @@ export function createPlayer(desk) {
     else if (isPlaying.value && video.paused && !isCutting) video.play().catch(() => {});
   }, { signal: life });
   video.addEventListener("loadedmetadata", () => { if (moment.value > desk.first || shown > desk.first) seek(moment.value); }, { signal: life });
+  // Until the film is played or sought, a browser goes on showing the poster, which is another moment.
+  video.addEventListener("loadeddata", () => video.removeAttribute("poster"), { signal: life });
   video.addEventListener("error", () => { isBroken.set(true); video.remove(); }, { signal: life });
   // A busy machine shows none of the last frames.
   video.addEventListener("ended", () => { const goesOn = cut; step(desk.last()); if (!goesOn) pause(); }, { signal: life });

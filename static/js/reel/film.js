@@ -41,6 +41,8 @@ export function film({ src, poster, fps, n_frames, label, life, onFrame, onState
   else for (const name of ["timeupdate", "seeked"]) video.addEventListener(name, () => { if (wanted < 0) show(Math.floor(video.currentTime * fps + EARLY)); }, { signal: life });
   video.addEventListener("seeked", () => { isSeeking = false; start(); }, { signal: life });
   video.addEventListener("loadedmetadata", start, { signal: life });
+  // Until the film is played or sought, a browser goes on showing the poster, which is another moment.
+  video.addEventListener("loadeddata", () => video.removeAttribute("poster"), { signal: life });
   video.addEventListener("play", () => tell(true), { signal: life });
   video.addEventListener("pause", () => tell(false), { signal: life });
   video.addEventListener("error", () => { tell(false); onBroken(); }, { signal: life });
