@@ -119,17 +119,16 @@ def tour(browser, address, film, out):
     cuts.append((begun, time.monotonic() - 0.5))
     expect_swimming(page)
     page.wait_for_timeout(2000)
-    page.get_by_role("link", name=say(page, "film.studio")).click()
-    expect_swimming(page)
-    page.wait_for_timeout(2500)
     box = flock_canvas(page).bounding_box()
     for step in range(60):
         turn = abs(step % 40 - 20) / 20
         page.mouse.move(box["x"] + box["width"] * (0.2 + 0.6 * turn), box["y"] + box["height"] * (0.3 + 0.3 * (step % 30) / 30))
         page.wait_for_timeout(80)
-    page.screenshot(path=out / "tour.png")
     page.mouse.move(4, 4)
-    page.wait_for_timeout(1500)
+    page.get_by_role("link", name=say(page, "film.studio")).click()
+    expect_swimming(page)
+    page.wait_for_timeout(2500)
+    page.screenshot(path=out / "tour.png")
     count = page.locator('[data-name="count"] input[type=range]')
     for n in (25, 30, 35, 40):
         count.fill(str(n))

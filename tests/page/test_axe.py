@@ -15,6 +15,8 @@ SIZES = {"phone": {"width": 390, "height": 844}, "desk": {"width": 1440, "height
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 RUN = """(tags) => axe.run(document, { runOnly: tags, resultTypes: ["violations"] }).then(({ violations }) =>
     violations.map(({ id, nodes }) => id + ": " + nodes.map(({ target, any }) => target.join(" ") + (any[0] ? " (" + any[0].message + ")" : "")).join(" | ")))"""
+# Faults of Swagger UI itself: its tags are headings of the third level, and its rows are buttons with links in them.
+SWAGGER_FAULTS = ("heading-order", "nested-interactive")
 NAMES = ["home", "films", "film", "desk", "studio", "reel", "flocks", "jobs"]
 
 
@@ -67,6 +69,17 @@ def test_no_violations_in_what_opens(visitor, filled_service, state):
     for theme in ("light", "dark"):
         page.emulate_media(color_scheme=theme, reduced_motion="reduce")
         assert violations(page) == []
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_no_violations_in_the_description_of_the_api(visitor, filled_service, theme):
+    page = visitor(color_scheme=theme, viewport=SIZES["desk"])
+    page.goto(f"{filled_service}/docs")
+    call = page.locator(".opblock", has_text="/readyz").first
+    expect(call).to_be_visible(timeout=LOAD_MS)
+    call.locator(".opblock-summary-control").click()
+    expect(call.locator(".opblock-body")).to_be_visible()
+    assert [one for one in violations(page) if not one.startswith(SWAGGER_FAULTS)] == []
 
 
 def test_canvas_says_what_swims_on_it(page, filled_service):
