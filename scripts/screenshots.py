@@ -4,8 +4,8 @@
     scripts/screenshots.py PROGRAM OUT [sheets] [tour]
 
 sheets: OUT/<place>.png shows a place in both themes, at three widths and in both languages. tour: OUT/tour.mp4 is a
-recording of about 20 s: a film is dropped, its flock swims, the pointer chases it, its film is made. OUT/tour.png is a
-still of it. Runs with the environment of the page's tests (`target/page-venv`). PROGRAM serves an example of its own.
+recording of about 20 s: a film is dropped, its flock swims, the pointer chases it, its film is made. A still of it is
+written to docs/page.jpg. Runs with the environment of the page's tests (`target/page-venv`). PROGRAM serves an example of its own.
 """
 import base64, pathlib, subprocess, sys, tempfile, time
 
@@ -128,7 +128,7 @@ def tour(browser, address, film, out):
     page.get_by_role("link", name=say(page, "film.studio")).click()
     expect_swimming(page)
     page.wait_for_timeout(2500)
-    page.screenshot(path=out / "tour.png")
+    page.screenshot(path=ROOT / "docs/page.jpg", quality=80)
     count = page.locator('[data-name="count"] input[type=range]')
     for n in (25, 30, 35, 40):
         count.fill(str(n))
