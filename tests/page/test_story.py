@@ -56,6 +56,7 @@ FOCUSED = """(() => {
 
 def test_the_whole_story_by_keys(page, empty_service, other_film):
     page.goto(empty_service)
+    settle(page)
     page.keyboard.press("Tab")
     assert page.evaluate(FOCUSED) == say(page, "skip")
     page.keyboard.press("Enter")
