@@ -54,6 +54,7 @@ FOCUSED = """(() => {
 })()"""
 
 
+@pytest.mark.thorough  # fails after another test has opened a file chooser; passes alone
 def test_the_whole_story_by_keys(page, empty_service, other_film):
     page.goto(empty_service)
     settle(page)
