@@ -7,7 +7,7 @@ import time
 import urllib.request
 from pathlib import Path
 
-from playwright.sync_api import Error, expect
+from playwright.sync_api import expect
 
 # An unoptimized program on two busy cores.
 LONG_MS = 240_000
@@ -18,11 +18,7 @@ LOAD_MS = 60_000
 def say(page, key, **values):
     """Returns the words of a key in the language of the page, which must be open."""
     script = "([key, values]) => import('/static/js/app/words.js').then(({ say }) => say(key, values))"
-    try:
-        return page.evaluate(script, [key, values])
-    except Error:  # the page was left meanwhile, for instance by signing in
-        page.wait_for_load_state()
-        return page.evaluate(script, [key, values])
+    return page.evaluate(script, [key, values])
 
 
 def said(page, key, **values):

@@ -54,17 +54,18 @@ FOCUSED = """(() => {
 })()"""
 
 
-@pytest.mark.thorough  # fails after another test has opened a file chooser; passes alone
 def test_the_whole_story_by_keys(page, empty_service, other_film):
+    # A listener that is added right before the key is at times too late for the browser.
+    choosers = []
+    page.on("filechooser", lambda chooser: choosers.append(chooser))
     page.goto(empty_service)
-    settle(page)
     page.keyboard.press("Tab")
     assert page.evaluate(FOCUSED) == say(page, "skip")
     page.keyboard.press("Enter")
     tab_to(page, say(page, "home.choose"))
-    with page.expect_file_chooser() as chooser:
-        page.keyboard.press("Enter")
-    chooser.value.set_files(str(other_film))
+    page.keyboard.press("Enter")
+    until(page, lambda: choosers)
+    choosers[0].set_files(str(other_film))
     expect(heading(page)).to_have_text(other_film.stem, timeout=LONG_MS)
     expect(heading(page)).to_be_focused()
     expect(page.get_by_text(say(page, "film.swims"))).to_be_visible(timeout=LONG_MS)

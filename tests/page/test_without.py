@@ -104,9 +104,15 @@ def test_five_hundred_flocks_are_listed_page_by_page(page, filled_service):
     expect(page.get_by_text(say(page, "reels.found", n=0, query="no such film"))).to_be_visible()
 
 
-def sign_in(page, text):
+def give_token(page, text):
     page.get_by_label(say(page, "session.token"), exact=True).fill(text)
     page.get_by_role("button", name=say(page, "session.begin")).click()
+
+
+def sign_in(page, text):
+    """Gives a valid token, after which the page loads again."""
+    with page.expect_navigation():
+        give_token(page, text)
 
 
 def test_a_service_with_tokens_is_signed_in_to_and_out_of(page, closed_service):
@@ -115,7 +121,7 @@ def test_a_service_with_tokens_is_signed_in_to_and_out_of(page, closed_service):
     field = page.get_by_label(say(page, "session.token"), exact=True)
     expect(field).to_be_focused()
     expect(page.get_by_text(say(page, "home.choose"), exact=True)).to_be_hidden()
-    sign_in(page, key[:-1] + "!")
+    give_token(page, key[:-1] + "!")
     expect(page.get_by_role("alert")).to_contain_text("unauthenticated")
     sign_in(page, key)
     expect(page.get_by_role("main")).to_contain_text(say(page, "home.empty"))
