@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { changedParams, sizeFromRuler } from "../../static/js/desk/anew-params.js";
+import { changedParams, sizeFromRuler } from "../../static/js/desk/remeasure-params.js";
 import { append, derive, emptyColumns, fillTailBeat, firstFrame, frameAt, headOf } from "../../static/js/desk/columns.js";
 import { gapsOf } from "../../static/js/desk/gaps.js";
 import { svgPen, thinned, trace } from "../../static/js/desk/lines.js";

@@ -36,7 +36,7 @@ def test_an_upload_by_tus_js_client_goes_on_where_it_was_cut(tmp_path, film):
         said = json.loads(done.stdout)
         assert wire.cuts == 1 and said["retries"] >= 1, said
         assert 0 < said["offsets"][-1] <= size // 2, said
-        assert wire.carried_bytes < 1.1 * size, "the first half was sent anew"
+        assert wire.carried_bytes < 1.1 * size, "the first half was sent again"
         [footage] = json.load(urllib.request.urlopen(f"{address}/v1/footage"))["items"]
         assert footage["sha256"] == hashlib.sha256(film.read_bytes()).hexdigest()
         assert footage["name"] == film.name

@@ -9,9 +9,9 @@ import { count, say } from "../app/words.js";
 import { mendsOf } from "../parts/mend.js";
 import { problemBox, showProblem } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
-import { choice, part, rulerFields, slide } from "./anew-fields.js";
-import { changedParams, sizeFromRuler } from "./anew-params.js";
-import { createPicture } from "./anew-picture.js";
+import { choice, part, rulerFields, slide } from "./remeasure-fields.js";
+import { changedParams, sizeFromRuler } from "./remeasure-params.js";
+import { createPicture } from "./remeasure-picture.js";
 import { comparison, settingName } from "./numbers.js";
 
 const TOOLS = ["animal", "head", "ignore", "ruler"];
@@ -20,7 +20,7 @@ const TOOLS = ["animal", "head", "ignore", "ruler"];
  * Opens the dialog. @param {import("./instrument.js").Instrument} desk
  * @param {{player: import("./player.js").Player, results: HTMLElement, tool?: string, params?: any}} options
  */
-export async function measureAnew(desk, { player, results, tool: first = "animal", params = {} }) {
+export async function measureRemeasure(desk, { player, results, tool: first = "animal", params = {} }) {
   const { library } = desk;
   player.pause();
   const closing = new AbortController();
@@ -32,11 +32,11 @@ export async function measureAnew(desk, { player, results, tool: first = "animal
   const ruler = signal(/** @type {number[][] | null} */ (null));
   const picture = createPicture(desk, { video: player.video, isBroken: player.isBroken.value, tool, draft, ruler, life });
 
-  const radios = TOOLS.map((name) => element("label.choice", {}, element("input", { type: "radio", name: "anew-tool", value: name, checked: name === tool.value, onchange: () => tool.set(name) }), element("span", {}, say(`anew.tool.${name}`))));
+  const radios = TOOLS.map((name) => element("label.choice", {}, element("input", { type: "radio", name: "remeasure-tool", value: name, checked: name === tool.value, onchange: () => tool.set(name) }), element("span", {}, say(`remeasure.tool.${name}`))));
   const help = element("p.soft");
   const measures = { line_cm: 0, away_cm: former.camera ? 100 * former.camera.z_min_m : 0, medium_index: former.camera?.medium_index ?? (library.view === "side" ? 1.333 : 1) };
   const size = element("div", {}, rulerFields((name, value) => { /** @type {any} */ (measures)[name] = value; applyRuler(); }, measures));
-  tool.watch((now) => { help.textContent = say(`anew.tool.${now}.help`); size.hidden = now !== "ruler"; }, life);
+  tool.watch((now) => { help.textContent = say(`remeasure.tool.${now}.help`); size.hidden = now !== "ruler"; }, life);
   const applyRuler = () => {
     if (!ruler.value || !(measures.line_cm > 0) || !(measures.away_cm > 0)) return;
     const [a, b] = ruler.value;
@@ -47,27 +47,27 @@ export async function measureAnew(desk, { player, results, tool: first = "animal
   desk.moment.watch((now) => { frame.value = String(now); }, life);
 
   let preset = "";
-  const presets = element("select", { name: "preset", onchange: () => { preset = presets.value; tell(); } }, ...["", "papers"].map((name) => element("option", { value: name }, say(`anew.preset.${name || "none"}`))));
-  const marks = element("ul.anew-marks");
+  const presets = element("select", { name: "preset", onchange: () => { preset = presets.value; tell(); } }, ...["", "papers"].map((name) => element("option", { value: name }, say(`remeasure.preset.${name || "none"}`))));
+  const marks = element("ul.remeasure-marks");
   const sent = element("p.soft", { role: "status" });
   const problem = element("div");
-  const start = element("button", { type: "submit" }, say("anew.start"));
+  const start = element("button", { type: "submit" }, say("remeasure.start"));
   const changes = () => changedParams({ draft: draft.value, former, defaults, preset });
   const tell = () => {
     marks.replaceChildren(...marksOf(draft));
     const names = [...(preset ? ["preset"] : []), ...Object.keys(changes()).filter((name) => name !== "preset" && JSON.stringify(draft.value[name]) !== JSON.stringify(former[name]))];
-    sent.textContent = names.length ? say("anew.sends", { names: names.map(settingName).join(", ") }) : say("anew.sends_none");
+    sent.textContent = names.length ? say("remeasure.sends", { names: names.map(settingName).join(", ") }) : say("remeasure.sends_none");
   };
   draft.watch(tell, life);
 
   const form = element("form", { method: "dialog" },
-    element("header.place-head", {}, element("h2", {}, say("anew.title")), element("button.quiet", { type: "button", onclick: () => dialog.close() }, say("cancel"))),
-    element("div.anew-columns", {},
-      element("div.anew-left", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("anew.tools")), ...radios), help, element("div.anew-room", {}, picture), frame, size, marks),
-      element("div.anew-right", {}, choice(draft, "view", [null, "side", "top"]), choice(draft, "follow", ["one", "largest"]), slide(draft, "threshold", { min: 1, max: 100, step: 1 }), part(draft, desk), slide(draft, "kappa", { min: 1, max: 6, step: 0.5 }), choice(draft, "sprites", ["auto", "always"]),
-        element("label.field", {}, say("anew.preset"), presets, element("small", {}, say("anew.preset.help"))))),
-    element("footer.anew-foot", {}, sent, problem, start));
-  const dialog = element("dialog.anew", { "aria-label": say("anew.title") }, form);
+    element("header.place-head", {}, element("h2", {}, say("remeasure.title")), element("button.quiet", { type: "button", onclick: () => dialog.close() }, say("cancel"))),
+    element("div.remeasure-columns", {},
+      element("div.remeasure-left", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("remeasure.tools")), ...radios), help, element("div.remeasure-room", {}, picture), frame, size, marks),
+      element("div.remeasure-right", {}, choice(draft, "view", [null, "side", "top"]), choice(draft, "follow", ["one", "largest"]), slide(draft, "threshold", { min: 1, max: 100, step: 1 }), part(draft, desk), slide(draft, "kappa", { min: 1, max: 6, step: 0.5 }), choice(draft, "sprites", ["auto", "always"]),
+        element("label.field", {}, say("remeasure.preset"), presets, element("small", {}, say("remeasure.preset.help"))))),
+    element("footer.remeasure-foot", {}, sent, problem, start));
+  const dialog = element("dialog.remeasure", { "aria-label": say("remeasure.title") }, form);
   dialog.addEventListener("close", () => { closing.abort(); dialog.remove(); });
   form.addEventListener("submit", async (/** @type {Event} */ event) => {
     event.preventDefault();
@@ -98,34 +98,34 @@ async function defaultParams(life) {
 async function follow(desk, { begun: { job_id: jobId, library_id: libraryId }, params, results, player }) {
   await expect(jobId);
   const card = jobCard({ id: jobId, kind: "analysis", subject: { kind: "footage", id: desk.library.footage_id } });
-  results.replaceChildren(element("h2", {}, say("anew.title")), card);
+  results.replaceChildren(element("h2", {}, say("remeasure.title")), card);
   results.scrollIntoView({ block: "center" });
   try {
     await ended(jobId, desk.life, card.update);
     const [library, facts] = await Promise.all([get(`/v1/libraries/${libraryId}`, desk.life), get(`/v1/libraries/${libraryId}/library.json`, desk.life)]);
-    const link = element("a.button", { href: `/libraries/${libraryId}?compare=${desk.library.id}` }, say("anew.open"));
+    const link = element("a.button", { href: `/libraries/${libraryId}?compare=${desk.library.id}` }, say("remeasure.open"));
     results.replaceChildren(element("h2", {}, say("desk.compare.title")), comparison({ library: desk.library, facts: desk.facts.value }, { library, facts }), element("p.actions", {}, link));
   } catch (reason) {
     if (desk.life.aborted) return;
     if (/** @type {any} */ (reason).name === "AbortError") results.replaceChildren();
     else {
-      const mends = mendsOf(reason, (mend) => measureAnew(desk, { player, results, params: { ...params, ...mend } }));
-      const again = { label: say("anew.again"), act: () => measureAnew(desk, { player, results, params }) };
+      const mends = mendsOf(reason, (mend) => measureRemeasure(desk, { player, results, params: { ...params, ...mend } }));
+      const again = { label: say("remeasure.again"), act: () => measureRemeasure(desk, { player, results, params }) };
       results.replaceChildren(problemBox(reason, [...mends, again]));
     }
   }
 }
 
-/** Returns the list of what was drawn, each with a button that removes it. @param {import("./anew-fields.js").Draft} draft */
+/** Returns the list of what was drawn, each with a button that removes it. @param {import("./remeasure-fields.js").Draft} draft */
 function marksOf(draft) {
   const { animal_at, head, ignore, camera, animal } = draft.value;
-  const row = (/** @type {string} */ text, /** @type {any} */ without) => element("li", {}, element("span", {}, text), element("button.quiet", { type: "button", "aria-label": say("anew.remove_one", { what: text }), onclick: () => draft.set({ ...draft.value, ...without }) }, say("anew.remove")));
+  const row = (/** @type {string} */ text, /** @type {any} */ without) => element("li", {}, element("span", {}, text), element("button.quiet", { type: "button", "aria-label": say("remeasure.remove_one", { what: text }), onclick: () => draft.set({ ...draft.value, ...without }) }, say("remeasure.remove")));
   const at = (/** @type {number[]} */ point) => point.map(Math.round).join(", ");
   return [
-    ...(animal_at ? [row(say("anew.mark.animal", { at: at(animal_at.at_px), frame: String(animal_at.frame) }), { animal_at: null })] : []),
-    ...(head ? [row(say("anew.mark.head", { at: at(head.point), frame: String(head.frame) }), { head: null })] : []),
-    ...ignore.map((/** @type {any} */ one, /** @type {number} */ k) => row(say("anew.mark.ignore", { size: `${one.box_px[2]} × ${one.box_px[3]}` }), { ignore: ignore.filter((/** @type {any} */ _, /** @type {number} */ idx) => idx !== k) })),
-    ...(camera && animal ? [row(say("anew.mark.size", { cm: count(100 * animal.length_m) }), { camera: null, animal: null })] : []),
+    ...(animal_at ? [row(say("remeasure.mark.animal", { at: at(animal_at.at_px), frame: String(animal_at.frame) }), { animal_at: null })] : []),
+    ...(head ? [row(say("remeasure.mark.head", { at: at(head.point), frame: String(head.frame) }), { head: null })] : []),
+    ...ignore.map((/** @type {any} */ one, /** @type {number} */ k) => row(say("remeasure.mark.ignore", { size: `${one.box_px[2]} × ${one.box_px[3]}` }), { ignore: ignore.filter((/** @type {any} */ _, /** @type {number} */ idx) => idx !== k) })),
+    ...(camera && animal ? [row(say("remeasure.mark.size", { cm: count(100 * animal.length_m) }), { camera: null, animal: null })] : []),
   ];
 }
 

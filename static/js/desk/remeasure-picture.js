@@ -21,7 +21,7 @@ export function createPicture(desk, { video, isBroken, tool, draft, ruler, life 
   /** Cross of the keyboard. */
   let cross = size.map((/** @type {number} */ side) => side / 2);
   let isKeyboard = false;
-  const { canvas, ask } = drawnCanvas(life, draw, { tabIndex: 0, className: "anew-picture", role: "application", "aria-label": say("anew.picture") });
+  const { canvas, ask } = drawnCanvas(life, draw, { tabIndex: 0, className: "remeasure-picture", role: "application", "aria-label": say("remeasure.picture") });
   canvas.style.aspectRatio = size.join(" / ");
 
   /** @param {import("./canvas.js").Paper} paper */

@@ -7,9 +7,9 @@ import { say, seconds } from "../app/words.js";
 
 /** Returns a field that chooses one of some values. @param {Draft} draft @param {string} name @param {(string | null)[]} values */
 export function choice(draft, name, values) {
-  const select = element("select", { name, onchange: () => draft.set({ ...draft.value, [name]: values[select.selectedIndex] }) }, ...values.map((value) => element("option", { value: value ?? "" }, say(`anew.${name}.${value ?? "null"}`))));
+  const select = element("select", { name, onchange: () => draft.set({ ...draft.value, [name]: values[select.selectedIndex] }) }, ...values.map((value) => element("option", { value: value ?? "" }, say(`remeasure.${name}.${value ?? "null"}`))));
   draft.watch((now) => { select.selectedIndex = values.indexOf(now[name] ?? null); });
-  return element("label.field", {}, say(`anew.${name}`), select, element("small", {}, say(`anew.${name}.help`)));
+  return element("label.field", {}, say(`remeasure.${name}`), select, element("small", {}, say(`remeasure.${name}.help`)));
 }
 
 /** Returns a slider. @param {Draft} draft @param {string} name @param {{min: number, max: number, step: number}} range */
@@ -17,7 +17,7 @@ export function slide(draft, name, range) {
   const output = element("output");
   const input = element("input", { type: "range", name, ...range, oninput: () => draft.set({ ...draft.value, [name]: input.valueAsNumber }) });
   draft.watch((now) => { input.value = String(now[name]); output.textContent = String(now[name]); });
-  return element("label.field", {}, element("span.field-line", {}, say(`anew.${name}`), output), input, element("small", {}, say(`anew.${name}.help`)));
+  return element("label.field", {}, element("span.field-line", {}, say(`remeasure.${name}`), output), input, element("small", {}, say(`remeasure.${name}.help`)));
 }
 
 /** Returns two handles on an axis of the film. @param {Draft} draft @param {import("./instrument.js").Instrument} desk */
@@ -26,7 +26,7 @@ export function part(draft, desk) {
   const output = element("output");
   const fill = element("i");
   const handle = (/** @type {"from_s" | "to_s"} */ name) => {
-    const input = element("input", { type: "range", name, min: 0, max: end_s, step: 0.1, "aria-label": say(`anew.${name}`) });
+    const input = element("input", { type: "range", name, min: 0, max: end_s, step: 0.1, "aria-label": say(`remeasure.${name}`) });
     input.addEventListener("input", () => {
       const other = name === "from_s" ? draft.value.to_s ?? end_s : draft.value.from_s ?? 0;
       const value = name === "from_s" ? Math.min(input.valueAsNumber, other - 0.5) : Math.max(input.valueAsNumber, other + 0.5);
@@ -39,10 +39,10 @@ export function part(draft, desk) {
   draft.watch((now) => {
     const [a, b] = [now.from_s ?? 0, now.to_s ?? end_s];
     [from.value, to.value] = [String(a), String(b)];
-    output.textContent = now.from_s === null && now.to_s === null ? say("anew.part.whole") : say("anew.part.of", { from: seconds(a), to: seconds(b) });
+    output.textContent = now.from_s === null && now.to_s === null ? say("remeasure.part.whole") : say("remeasure.part.of", { from: seconds(a), to: seconds(b) });
     fill.style.insetInline = `${(100 * a) / end_s}% ${100 - (100 * b) / end_s}%`;
   });
-  return element("div.field", { role: "group", "aria-label": say("anew.part") }, element("span.field-line", {}, say("anew.part"), output), element("div.two-handles", {}, fill, from, to));
+  return element("div.field", { role: "group", "aria-label": say("remeasure.part") }, element("span.field-line", {}, say("remeasure.part"), output), element("div.two-handles", {}, fill, from, to));
 }
 
 /**
@@ -52,9 +52,9 @@ export function part(draft, desk) {
 export function rulerFields(onChange, values) {
   const number = (/** @type {string} */ name) => {
     const input = element("input", { type: "number", name, min: 0.1, step: "any", inputMode: "decimal", value: values[name] ? String(values[name]) : "", oninput: () => onChange(name, input.valueAsNumber) });
-    return element("label.field", {}, say(`anew.${name}`), input, element("small", {}, say(`anew.${name}.help`)));
+    return element("label.field", {}, say(`remeasure.${name}`), input, element("small", {}, say(`remeasure.${name}.help`)));
   };
-  const medium = element("select", { name: "medium_index", onchange: () => onChange("medium_index", Number(medium.value)) }, element("option", { value: "1" }, say("anew.medium.air")), element("option", { value: "1.333" }, say("anew.medium.water")));
+  const medium = element("select", { name: "medium_index", onchange: () => onChange("medium_index", Number(medium.value)) }, element("option", { value: "1" }, say("remeasure.medium.air")), element("option", { value: "1.333" }, say("remeasure.medium.water")));
   medium.value = String(values.medium_index);
-  return element("div.fields", {}, number("line_cm"), number("away_cm"), element("label.field", {}, say("anew.medium"), medium));
+  return element("div.fields", {}, number("line_cm"), number("away_cm"), element("label.field", {}, say("remeasure.medium"), medium));
 }
