@@ -1,0 +1,26 @@
+// Keys of a place: they work on the whole page, except where the focused element needs the key itself.
+// @ts-check
+
+/**
+ * Listens for keys until `life` ends. A field, an open dialog, and a button for Space keep theirs.
+ * @param {AbortSignal} life @param {Record<string, (event: KeyboardEvent) => void>} acts what each key does, by its
+ *   name; letters are small
+ */
+export function hearKeys(life, acts) {
+  document.addEventListener("keydown", (event) => {
+    if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || isTaken(event)) return;
+    const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!act) return;
+    event.preventDefault();
+    act(event);
+  }, { signal: life });
+}
+
+/** Returns whether the focused element needs the key itself. @param {KeyboardEvent} event */
+function isTaken({ key, target }) {
+  const node = /** @type {HTMLElement} */ (target);
+  if (document.querySelector("dialog[open]")) return true;
+  if (node.matches?.("input:not([type=checkbox]):not([type=radio]), select, textarea")) return true;
+  if (node.matches?.("[role=tab], input[type=radio], .table-room") && (key.startsWith("Arrow") || key === "Home" || key === "End")) return true;
+  return key === " " && Boolean(node.closest?.("button, a, summary, input, [role=button]"));
+}
