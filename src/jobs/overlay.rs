@@ -3,35 +3,43 @@
 //! poster too, made before it is analyzed.
 
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use super::Error;
-use crate::media::{Encoding, VideoFormat, VideoWriter};
+use crate::media::{self, Encoding, VideoFormat, VideoWriter};
 use crate::store::footage::POSTER;
 use flockreel_core::footage::FrameSource;
+use flockreel_core::formats::evidence::small_jpeg;
 use flockreel_core::formats::overlay::Overlay;
 use flockreel_core::library::Poses;
 use flockreel_core::progress::Progress;
 use flockreel_core::raster::Frame;
 
-/// Last frame that may be the poster of footage. A film cannot be read from its middle, so this limits the time
-/// of an upload. Free choice.
+/// Last frame that may be the poster of footage. A film cannot be read from its middle. Free choice.
 const MAX_POSTER_FRAME: usize = 30;
+/// Time after which an upload looks for no later frame. Free choice.
+const MAX_POSTER_TIME: Duration = Duration::from_secs(10);
 
 /// Writes a frame as `poster.jpg` into a folder: the middle one, or an earlier one of long footage.
 pub(super) fn write_poster(source: &dyn FrameSource, folder: &Path) -> Result<(), Error> {
     let format = source.format();
     let wanted = (format.n_frames_hint / 2).min(MAX_POSTER_FRAME);
+    let begin = Instant::now();
     let (mut stream, mut frame, mut n_read) = (source.open()?, Frame::default(), 0);
-    while n_read <= wanted && stream.next_frame(&mut frame)?.is_some() {
+    while n_read <= wanted
+        && begin.elapsed() < MAX_POSTER_TIME
+        && stream.next_frame(&mut frame)?.is_some()
+    {
         n_read += 1;
     }
-    write_jpeg(&frame, &format.into(), folder)
+    if n_read == 0 {
+        return Err(media::Error::TooFewFrames { n_frames: 0 }.into());
+    }
+    write_jpeg(&frame, folder)
 }
 
-fn write_jpeg(frame: &Frame, format: &VideoFormat, folder: &Path) -> Result<(), Error> {
-    let mut poster = VideoWriter::create_as(&folder.join(POSTER), format, Encoding::Jpeg)?;
-    poster.write(frame)?;
-    Ok(poster.finish()?)
+fn write_jpeg(frame: &Frame, folder: &Path) -> Result<(), Error> {
+    Ok(std::fs::write(folder.join(POSTER), small_jpeg(frame))?)
 }
 
 /// Writes the footage with its poses drawn over it to `path`. The extension of `path` selects the container.
@@ -62,7 +70,7 @@ pub fn write_views(
     let overlay = folder.join("overlay.mp4");
     film_with(source, poses, &overlay, progress, |frame_idx, frame| {
         if Some(frame_idx) == poster_idx {
-            write_jpeg(frame, &format, folder)?;
+            write_jpeg(frame, folder)?;
         }
         Ok(film.write(frame)?)
     })?;

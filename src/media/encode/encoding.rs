@@ -32,8 +32,6 @@ pub enum Encoding {
     /// H.264 in MP4 for players that seek to every frame, from planar frames: at most 960 pixels wide, a key
     /// frame every 10 frames.
     Seekable,
-    /// JPEG, from planar frames.
-    Jpeg,
     /// Animated GIF, at most 480 pixels wide and 15 frames per second, from planar frames.
     Gif,
 }
@@ -41,10 +39,7 @@ pub enum Encoding {
 impl Encoding {
     /// Returns whether frames are RGBA, not planar.
     pub fn takes_rgba(self) -> bool {
-        !matches!(
-            self,
-            Encoding::H264(_) | Encoding::Seekable | Encoding::Jpeg | Encoding::Gif
-        )
+        !matches!(self, Encoding::H264(_) | Encoding::Seekable | Encoding::Gif)
     }
 
     /// Returns whether width and height must be even.
@@ -119,11 +114,6 @@ impl Encoding {
                  -quality {quality} -compression_level 4 -f webp"
             ),
             Encoding::Seekable => seekable(format),
-            Encoding::Jpeg => {
-                "-vf scale=w='min(640,iw)':h=-2:out_range=pc,format=yuvj420p -c:v mjpeg -q:v 4 \
-                 -frames:v 1 -f mjpeg"
-                    .to_owned()
-            }
             Encoding::Gif => format!(
                 "-vf {SMALL},split[a][b];[a]palettegen=stats_mode=full[p];\
                  [b][p]paletteuse=dither=bayer:bayer_scale=4 -c:v gif -loop 0 -f gif"
@@ -171,10 +161,9 @@ fn seekable(format: &VideoFormat) -> String {
 
 fn h264(format: &VideoFormat, quality: Quality) -> String {
     let Quality { crf, threads } = quality;
-    // The bitstream
-    // filter removes the message in which x264 writes its version and settings. `subme` and `me` are set
-    // below the preset, because most of a video is background. A better motion search saves 5 to 9 % of size
-    // there, for a quarter of the time (docs/measurements.md).
+    // The bitstream filter removes the message in which x264 writes its version and settings. `subme` and
+    // `me` are set below the preset, because most of a video is background. A better motion search saves
+    // 5 to 9 % of size there, for a quarter of the time (docs/measurements.md).
     format!(
         "-vf {} -c:v libx264 -preset veryfast -profile:v high -crf {crf} -threads {threads} \
          -x264-params cpu-independent=1:subme=1:me=dia -bsf:v filter_units=remove_types=6 \

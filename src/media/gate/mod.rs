@@ -260,10 +260,9 @@ impl Child {
         }
     }
 
-    /// Extends the time limit by the time in which the child waited for a processor, as far as it was not
-    /// extended for it before, and at most by the stall limit. Returns the extension. Fails with
-    /// [`Error::TimeLimit`] if the child waited less than a tenth of the stall limit, because then it was not
-    /// the lack of a processor that took the time.
+    /// Extends the limits by the time in which the child waited for a processor, at most by the stall limit.
+    /// Time that was counted before is not counted again. Returns the extension. Fails with
+    /// [`Error::TimeLimit`] if the child waited less than a tenth of the stall limit: it was slow by itself.
     fn extend_limits(&mut self) -> Result<Duration, Error> {
         let waited = processor_wait(self.group).saturating_sub(self.credited);
         let extension = waited.min(self.stall_limit);

@@ -55,6 +55,11 @@ fn mark_changes(before: &Frame, after: &Frame, picture: &mut RgbImage) {
     }
 }
 
+/// Returns a frame as JPEG, reduced so that no side is longer than 640 pixels. Panics if it has no pixels.
+pub fn small_jpeg(frame: &Frame) -> Vec<u8> {
+    picture::write_jpeg(&reduced(&frame.to_rgb()))
+}
+
 /// Returns the picture, reduced so that no side is longer than [`MAX_SIDE_PX`].
 fn reduced(picture: &RgbImage) -> RgbImage {
     let [width, height] = [picture.width, picture.height].map(f64::from);

@@ -23,56 +23,32 @@ const VERSION: u32 = 1;
 /// Returns the flock as bytes.
 pub fn write(flock: &Flock) -> Vec<u8> {
     let mut columns = Columns::default();
-    let individuals = flock.individuals.as_slice();
-    let cells = |name, scale, of: &dyn Fn(&Individual, usize) -> f64| {
-        let n_frames = flock.params.frames as usize;
-        let all = individuals.iter();
-        let values = all.flat_map(|one| (0..n_frames).map(|t| of(one, t)));
-        (name, scale, values.collect::<Vec<f64>>())
+    let n_frames = flock.params.frames as usize;
+    let mut cells = |name, scale, of: &dyn Fn(&Individual, usize) -> f64| {
+        let all = flock.individuals.iter();
+        let values = all.flat_map(|one| (0..n_frames).map(move |t| of(one, t)));
+        columns.add(name, scale, values);
     };
-    let of_cells = [
-        cells("source_frame", 1.0, &|one, t| one.source_frame[t].into()),
-        cells("mirrored", 1.0, &|one, t| one.mirrored[t].into()),
-        cells("x", 1e-2, &|one, t| one.centroid_px[t][0]),
-        cells("y", 1e-2, &|one, t| one.centroid_px[t][1]),
-        cells("rotation", 1e-5, &|one, t| one.rotation_rad[t]),
-        cells("scale", 1e-4, &|one, t| one.scale[t]),
-        cells("depth", 1e-2, &|one, t| one.boid.position_px[t][2]),
-        cells("state", 1.0, &|one, t| {
-            one.state
-                .get(t)
-                .map_or(0.0, |&state| f64::from(state as u8))
-        }),
-    ];
-    let fades = || individuals.iter().flat_map(|one| &one.fades);
-    let of_fades = [
-        (
-            "fade_source_frame",
-            1.0,
-            fades()
-                .flat_map(|fade| &fade.source_frame)
-                .map(|&frame| frame.into())
-                .collect(),
-        ),
-        (
-            "fade_rotation",
-            1e-5,
-            fades().flat_map(|fade| fade.rotation_rad.clone()).collect(),
-        ),
-        (
-            "fade_scale",
-            1e-4,
-            fades().flat_map(|fade| fade.scale.clone()).collect(),
-        ),
-        (
-            "fade_weight",
-            1e-4,
-            fades().flat_map(|fade| fade.weight.clone()).collect(),
-        ),
-    ];
-    for (name, scale, values) in of_cells.into_iter().chain(of_fades) {
-        columns.add(name, scale, &values);
-    }
+    cells("source_frame", 1.0, &|one, t| one.source_frame[t].into());
+    cells("mirrored", 1.0, &|one, t| one.mirrored[t].into());
+    cells("x", 1e-2, &|one, t| one.centroid_px[t][0]);
+    cells("y", 1e-2, &|one, t| one.centroid_px[t][1]);
+    cells("rotation", 1e-5, &|one, t| one.rotation_rad[t]);
+    cells("scale", 1e-4, &|one, t| one.scale[t]);
+    cells("depth", 1e-2, &|one, t| one.boid.position_px[t][2]);
+    cells("state", 1.0, &|one, t| {
+        let state = one.state.get(t);
+        state.map_or(0.0, |&state| f64::from(state as u8))
+    });
+    let fades = || flock.individuals.iter().flat_map(|one| &one.fades);
+    let sources = fades().flat_map(|fade| &fade.source_frame);
+    columns.add("fade_source_frame", 1.0, sources.map(|&frame| frame.into()));
+    let rotations = fades().flat_map(|fade| fade.rotation_rad.iter().copied());
+    columns.add("fade_rotation", 1e-5, rotations);
+    let scales = fades().flat_map(|fade| fade.scale.iter().copied());
+    columns.add("fade_scale", 1e-4, scales);
+    let weights = fades().flat_map(|fade| fade.weight.iter().copied());
+    columns.add("fade_weight", 1e-4, weights);
     assemble(&head(flock, columns.table), &columns.bytes)
 }
 
@@ -175,8 +151,8 @@ struct Columns {
 
 impl Columns {
     /// Adds a column whose values are multiples of `scale`.
-    fn add(&mut self, name: &'static str, scale: f64, values: &[f64]) {
-        let integers = values.iter().map(|value| (value / scale).round() as i64);
+    fn add(&mut self, name: &'static str, scale: f64, values: impl Iterator<Item = f64>) {
+        let integers = values.map(|value| (value / scale).round() as i64);
         let integers: Vec<i64> = integers.collect();
         let least = integers.iter().copied().min().unwrap_or(0);
         let most = integers.iter().copied().max().unwrap_or(0);
