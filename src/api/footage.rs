@@ -212,7 +212,7 @@ pub(super) async fn get_footage_file(access: Access, Id(id): Id, conditions: Con
 
 /// Get a frame of the video as a picture.
 ///
-/// It is a JPEG of at most 640 pixels in width. Fails with `not_found` for footage that was uploaded to a
+/// It is a JPEG; no side is longer than 640 pixels. Fails with `not_found` for footage that was uploaded to a
 /// version without posters.
 #[utoipa::path(get, path = "/v1/footage/{id}/poster.jpg", params(("id" = Uuid, Path)), responses(
     (status = 200, content_type = "image/jpeg"),

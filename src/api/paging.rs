@@ -41,7 +41,7 @@ pub(super) struct FootageQuery {
     limit: i64,
     /// `next_cursor` of the previous page. Without it the first page is returned.
     cursor: Option<Uuid>,
-    /// Text that the name contains, in any case.
+    /// Text that the name contains. The case of ASCII letters does not matter.
     q: Option<String>,
 }
 
@@ -58,7 +58,7 @@ pub(super) struct LibraryQuery {
     cursor: Option<Uuid>,
     /// Footage that the libraries were made from.
     footage_id: Option<Uuid>,
-    /// Text that the name of the footage contains, in any case.
+    /// Text that the name of the footage contains. The case of ASCII letters does not matter.
     q: Option<String>,
 }
 
@@ -77,7 +77,7 @@ pub(super) struct FilmQuery {
     footage_id: Option<Uuid>,
     /// Library that they were made from.
     library_id: Option<Uuid>,
-    /// Text that the name of the footage contains, in any case.
+    /// Text that the name of the footage contains. The case of ASCII letters does not matter.
     q: Option<String>,
 }
 
@@ -159,25 +159,35 @@ async fn read<Q: DeserializeOwned, S: Send + Sync>(
 impl From<FootageQuery> for Listing {
     fn from(query: FootageQuery) -> Listing {
         let FootageQuery { limit, cursor, q } = query;
-        let filter = ResourceFilter {
-            name_contains: q,
-            ..ResourceFilter::default()
-        };
-        let paging = Paging { limit, cursor };
-        Listing { paging, filter }
+        let (footage_id, library_id) = (None, None);
+        FilmQuery {
+            limit,
+            cursor,
+            footage_id,
+            library_id,
+            q,
+        }
+        .into()
     }
 }
 
 impl From<LibraryQuery> for Listing {
     fn from(query: LibraryQuery) -> Listing {
-        let filter = ResourceFilter {
-            footage_id: query.footage_id,
-            name_contains: query.q,
-            ..ResourceFilter::default()
-        };
-        let (limit, cursor) = (query.limit, query.cursor);
-        let paging = Paging { limit, cursor };
-        Listing { paging, filter }
+        let LibraryQuery {
+            limit,
+            cursor,
+            footage_id,
+            q,
+        } = query;
+        let library_id = None;
+        FilmQuery {
+            limit,
+            cursor,
+            footage_id,
+            library_id,
+            q,
+        }
+        .into()
     }
 }
 

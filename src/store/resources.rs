@@ -168,8 +168,8 @@ impl ResourceKind {
         }
     }
 
-    /// Returns the SQL of a [`ResourceFilter`], with its parameters from `$4` on. `like` is not sensitive to
-    /// case in SQLite only, so both sides are in lower case.
+    /// Returns the SQL of a [`ResourceFilter`], with its parameters from `$4` on. `like` ignores case in
+    /// SQLite only, so both sides are in lower case. SQLite converts ASCII letters only.
     fn condition(self) -> String {
         let [footage_id, library_id, name] = match self {
             ResourceKind::Footage => ["r.id", "r.id", "r.name"],

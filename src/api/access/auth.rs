@@ -7,7 +7,7 @@
 use std::net::{IpAddr, Ipv4Addr};
 use std::time::Instant;
 
-use axum::extract::{Request, State};
+use axum::extract::{MatchedPath, Request, State};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, HeaderName, Method, StatusCode, header};
 use axum::middleware::Next;
@@ -16,6 +16,7 @@ use axum::response::{IntoResponse, Response};
 use super::caller::{Caller, Proof};
 use super::cookie::session_cookie;
 use super::link::link_caller;
+use crate::api::page::PLACES;
 use crate::api::{AppState, Problem};
 use crate::jobs::clock::now_ms;
 use crate::store::tokens::secret::Presented;
@@ -44,7 +45,7 @@ pub(in crate::api) async fn authenticate(
 }
 
 async fn run_authenticated(state: &AppState, request: Request, next: Next) -> Response {
-    if is_open(request.uri().path()) {
+    if is_open(request.uri().path()) || is_place(&request) {
         return next.run(request).await;
     }
     let (mut parts, body) = request.into_parts();
@@ -60,11 +61,16 @@ async fn run_authenticated(state: &AppState, request: Request, next: Next) -> Re
     }
 }
 
-/// Returns whether a path needs no caller: the page, the documentation, the probes, and signing in. They hold
+/// Returns whether a request is for a place of the page, which holds no data of owners.
+fn is_place(request: &Request) -> bool {
+    let route = request.extensions().get::<MatchedPath>();
+    route.is_some_and(|route| PLACES.contains(&route.as_str()))
+}
+
+/// Returns whether a path needs no caller: the files of the page, the documentation, the probes, and signing in. They hold
 /// no data of owners. All paths not listed here need a caller.
 fn is_open(path: &str) -> bool {
     let exact = [
-        "/",
         "/docs",
         "/healthz",
         "/readyz",

@@ -13,7 +13,7 @@ use tower_http::compression::predicate::{And, Predicate, SizeAbove};
 
 use flockreel_core::formats::flock_plan;
 
-/// Length below which a response is not compressed, bytes: it fits into one packet either way.
+/// Length below which a response is not compressed, bytes. Free choice: it fits into one packet.
 const MIN_BYTES: u64 = 860;
 
 /// Media types that are compressed. All but the last are text.
@@ -28,12 +28,12 @@ const TYPES: [&str; 8] = [
     flock_plan::MEDIA_TYPE,
 ];
 
-type IsText = fn(StatusCode, Version, &HeaderMap, &Extensions) -> bool;
+type HasType = fn(StatusCode, Version, &HeaderMap, &Extensions) -> bool;
 
 /// Returns the layer that compresses responses.
-pub(in crate::api) fn layer() -> CompressionLayer<And<SizeAbove, IsText>> {
-    let is_text: IsText = |_, _, headers, _| is_compressed(headers);
-    CompressionLayer::new().compress_when(SizeAbove::new(MIN_BYTES).and(is_text))
+pub(in crate::api) fn layer() -> CompressionLayer<And<SizeAbove, HasType>> {
+    let has_type: HasType = |_, _, headers, _| is_compressed(headers);
+    CompressionLayer::new().compress_when(SizeAbove::new(MIN_BYTES).and(has_type))
 }
 
 /// Returns whether responses with these headers are compressed.
@@ -58,6 +58,10 @@ pub(in crate::api) async fn negotiate(mut request: Request, next: Next) -> Respo
         None => headers.remove(header::ACCEPT_ENCODING),
     };
     let mut response = next.run(request).await;
+    if response.status() == StatusCode::NOT_MODIFIED {
+        let vary = HeaderValue::from_static("accept-encoding");
+        response.headers_mut().append(header::VARY, vary);
+    }
     let is_weak = response.headers().contains_key(header::CONTENT_ENCODING)
         || (response.status() == StatusCode::NOT_MODIFIED && is_weak_304);
     if is_weak && let Some(tag) = response.headers_mut().get_mut(header::ETAG) {

@@ -47,12 +47,15 @@ pub(in crate::api) async fn preview_flock(
     let library_id = access.id_of::<Library>(request.library_id).await?;
     let library = access.find::<Library>(library_id).await?;
     let accepted = headers.get(header::ACCEPT);
-    let (media_type, write): (_, fn(&Flock) -> Vec<u8>) =
-        if accepted.is_some_and(|accepted| accepted == flock_plan::MEDIA_TYPE) {
-            (flock_plan::MEDIA_TYPE, flock_plan::write)
-        } else {
-            ("application/json", flock_json::write)
-        };
+    let accepted = accepted.and_then(|value| value.to_str().ok());
+    let mut types = accepted.unwrap_or_default().split(',');
+    let is_plan =
+        |one: &str| one.split(';').next().unwrap_or_default().trim() == flock_plan::MEDIA_TYPE;
+    let (media_type, write): (_, fn(&Flock) -> Vec<u8>) = if types.any(is_plan) {
+        (flock_plan::MEDIA_TYPE, flock_plan::write)
+    } else {
+        ("application/json", flock_json::write)
+    };
     let context = &access.state.context;
     let begun = Instant::now();
     let preview = synchronous::preview_flock(context, &library, params, write).await?;

@@ -38,7 +38,7 @@ pub(in crate::api) fn add(document: &mut OpenApi) {
         for operation in operations(item) {
             operation.tags = Some(vec![tag.to_owned()]);
         }
-        for (method, example) in examples(path) {
+        if let Some((method, example)) = example(path) {
             let operation = match method {
                 HttpMethod::Patch => item.patch.as_mut(),
                 _ => item.post.as_mut(),
@@ -54,19 +54,16 @@ pub(in crate::api) fn add(document: &mut OpenApi) {
 fn tag_of(path: &str) -> &'static str {
     let noun = path.strip_prefix("/v1/").unwrap_or(path);
     let noun = noun.split('/').next().unwrap_or_default();
-    let known = TAGS.iter().map(|(name, _)| *name);
+    let mut known = TAGS.iter().map(|(name, _)| *name);
     match noun {
         "events" => "jobs",
-        _ => known
-            .into_iter()
-            .find(|name| *name == noun)
-            .unwrap_or("service"),
+        _ => known.find(|name| *name == noun).unwrap_or("service"),
     }
 }
 
-/// Returns the examples of the bodies of a path.
-fn examples(path: &str) -> Vec<(HttpMethod, Value)> {
-    let post = |example| vec![(HttpMethod::Post, example)];
+/// Returns the method and the example of the body of a path.
+fn example(path: &str) -> Option<(HttpMethod, Value)> {
+    let post = |example| Some((HttpMethod::Post, example));
     match path {
         "/v1/analyses" => post(json!({"footage_id": "sample", "params": {"to_s": 10}})),
         "/v1/flocks" | "/v1/flocks/preview" => post(json!({
@@ -74,8 +71,8 @@ fn examples(path: &str) -> Vec<(HttpMethod, Value)> {
         })),
         "/v1/fish" => post(json!({"library_id": "sample"})),
         "/v1/flocks/{id}/links" => post(json!({"file": "video.mp4", "expires_s": 3600})),
-        "/v1/footage/{id}" => vec![(HttpMethod::Patch, json!({"name": "zebra finch.mp4"}))],
-        _ => Vec::new(),
+        "/v1/footage/{id}" => Some((HttpMethod::Patch, json!({"name": "zebra finch.mp4"}))),
+        _ => None,
     }
 }
 

@@ -30,7 +30,7 @@ struct Static;
 struct Vendor;
 
 /// Addresses of the places of the page. The page itself shows the place of its address.
-const PLACES: [&str; 11] = [
+pub(in crate::api) const PLACES: [&str; 11] = [
     "/",
     "/films",
     "/films/{id}",
@@ -62,12 +62,14 @@ pub(super) async fn get_missing(method: Method, headers: HeaderMap) -> Response<
     let accepted = headers.get(header::ACCEPT);
     let accepted = accepted.and_then(|accepted| accepted.to_str().ok());
     let is_browser = accepted.is_some_and(|accepted| accepted.contains("text/html"));
-    if method != Method::GET || !is_browser {
-        return Problem::not_found().into_response();
+    let is_read = matches!(method, Method::GET | Method::HEAD);
+    let vary = (header::VARY, "accept");
+    if !is_read || !is_browser {
+        return ([vary], Problem::not_found()).into_response();
     }
     let page = Static::get("index.html").map(|file| file.data.into_owned());
-    let media_type = [(header::CONTENT_TYPE, media_type("index.html"))];
-    (StatusCode::NOT_FOUND, media_type, page.unwrap_or_default()).into_response()
+    let headers = [(header::CONTENT_TYPE, media_type("index.html")), vary];
+    (StatusCode::NOT_FOUND, headers, page.unwrap_or_default()).into_response()
 }
 
 async fn get_file<Files: RustEmbed>(

@@ -40,6 +40,9 @@ async fn only_the_page_is_open_without_a_valid_token() {
     }
     for path in [
         "/",
+        "/films",
+        "/libraries/any/studio",
+        "/s/any",
         "/static/js/main.js",
         "/openapi.json",
         "/healthz",

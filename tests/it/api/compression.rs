@@ -85,6 +85,7 @@ async fn compressed_file_has_a_weak_etag_that_gives_304() {
         let again = get().header("if-none-match", known).send().await.unwrap();
         assert_eq!(again.status(), 304, "{known}");
         assert_eq!(again.headers()["etag"], said.as_str());
+        assert_eq!(again.headers()["vary"], "accept-encoding");
     }
     let page = app
         .get("/static/css/base.css")
