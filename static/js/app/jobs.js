@@ -74,7 +74,7 @@ export async function expect(id) {
 /**
  * Waits until a job has ended.
  * @param {string} id @param {AbortSignal} life @param {(job: any) => void} [onChange] hears every state
- * @returns {Promise<any>} the job when it is done; throws a Problem if it failed, was cancelled or deleted
+ * @returns {Promise<any>} the job when it is done; throws a Problem if it failed, an AbortError if it was cancelled or deleted
  */
 export function ended(id, life, onChange = () => {}) {
   return new Promise((resolve, reject) => {
@@ -82,7 +82,7 @@ export function ended(id, life, onChange = () => {}) {
     let seen = false;
     jobs.watch((all) => {
       const job = all.find((one) => one.id === id);
-      if (!job) return seen && reject(new Problem({ code: "cancelled" }));
+      if (!job) return seen && reject(new DOMException("deleted", "AbortError"));
       seen = true;
       onChange(job);
       if (job.state === "done") resolve(job);

@@ -18,8 +18,8 @@ export function thing(kind, id) {
   return /** @type {Promise<any>} */ (known.get(path));
 }
 
-/** Forgets a thing whose name changed. @param {string} kind @param {string} id */
-export const forget = (kind, id) => known.delete(`/v1/${kind}/${id}`);
+/** Forgets a thing that was deleted. @param {string} path */
+export const forget = (path) => known.delete(path);
 
 /** Keeps the things of a list, so that they need not be asked for one by one. @param {string} kind @param {any[]} items */
 export function remember(kind, items) {

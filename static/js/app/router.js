@@ -38,6 +38,12 @@ export function startRouter() {
   addEventListener("popstate", () => show({ scroll: history.state?.scroll ?? 0 }));
   document.addEventListener("click", (event) => {
     const link = /** @type {HTMLElement} */ (event.target).closest?.("a[href]");
+    // A link within the place moves the focus only: following it would build the place again.
+    if (link instanceof HTMLAnchorElement && link.hash && link.pathname === location.pathname && link.origin === location.origin) {
+      event.preventDefault();
+      byId(link.hash.slice(1)).focus();
+      return;
+    }
     if (!(link instanceof HTMLAnchorElement) || !isInside(link, event)) return;
     event.preventDefault();
     go(link.pathname + link.search);

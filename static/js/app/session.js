@@ -2,6 +2,7 @@
 // @ts-check
 import { post, remove } from "./api.js";
 import { byId, element } from "./element.js";
+import { showProblem } from "../parts/problem.js";
 import { styled } from "./router.js";
 import { say } from "./words.js";
 
@@ -13,9 +14,13 @@ export function startSession() {
   const out = byId("sign-out");
   out.hidden = !localStorage.getItem(SIGNED_IN);
   out.addEventListener("click", async () => {
-    await remove("/v1/session");
-    localStorage.removeItem(SIGNED_IN);
-    location.reload();
+    try {
+      await remove("/v1/session");
+      localStorage.removeItem(SIGNED_IN);
+      location.reload();
+    } catch (problem) {
+      showProblem(byId("place"), problem);
+    }
   });
   addEventListener("signed-out", () => {
     localStorage.removeItem(SIGNED_IN);
@@ -29,7 +34,7 @@ function askForToken(place) {
   if (document.getElementById("sign-in")) return;
   const token = element("input", { type: "password", name: "token", required: true, autocomplete: "current-password", spellcheck: false });
   const problem = element("div");
-  const form = element("form#sign-in.card", { method: "post", onsubmit: send },
+  const form = element("form#sign-in.sign-in.card", { method: "post", onsubmit: send },
     element("h1", { tabIndex: -1 }, say("session.title")), element("p.soft", {}, say("session.help")),
     element("label.field", {}, say("session.token"), token), element("button", { type: "submit" }, say("session.begin")), problem);
   styled("form");

@@ -25,7 +25,7 @@ const SHOWN_ELSEWHERE = ["view_unsure", "other_movers"];
 /** Most cards of other things that move. */
 const MOST_MOVERS = 6;
 
-/** @typedef {{measureRemeasure: (tool?: string, params?: any) => void, showTab: (tab: string) => void}} Acts */
+/** @typedef {{remeasure: (tool?: string, params?: any) => void, showTab: (tab: string) => void}} Acts */
 
 /** Returns the cards, which appear when the measurement is loaded. @param {import("./instrument.js").Instrument} desk @param {{pictures: any, shoot: any, acts: Acts}} parts */
 export function adviceCards(desk, { pictures, shoot, acts }) {
@@ -49,7 +49,7 @@ const card = (kind, picture, sentence, buttons) => element("li.advice", { classN
 function adviceCard(desk, { code, sentence }, { pictures, shoot, acts }) {
   // A compass shows headings, not turns.
   const mend = /^lacks_.*(turn|straight)$/.test(code) ? MENDS.few_jumps : code.startsWith("lacks_") ? { name: "compass", tab: "pose" } : MENDS[code];
-  const act = () => (mend.tab ? acts.showTab(mend.tab) : acts.measureRemeasure(mend.tool, mend.params));
+  const act = () => (mend.tab ? acts.showTab(mend.tab) : acts.remeasure(mend.tool, mend.params));
   return card("is-advice", pictureOf(code, { desk, pictures, shoot }), sentenceOf(desk, code, sentence), mend ? [{ name: mend.name, act }] : []);
 }
 
@@ -61,7 +61,7 @@ function sentenceOf({ library, facts, start_s, end_s }, code, sentence) {
 }
 
 /** The view, with the button that says the other one. @param {import("./instrument.js").Instrument} desk @param {any} shoot @param {Acts} acts */
-function viewCard(desk, shoot, { measureRemeasure }) {
+function viewCard(desk, shoot, { remeasure }) {
   const { library, columns: { value: columns } } = desk;
   const sure = desk.head.value?.view_confidence;
   const other = library.view === "side" ? "top" : "side";
@@ -71,19 +71,19 @@ function viewCard(desk, shoot, { measureRemeasure }) {
   for (let k = desk.first; k <= desk.last() && k < columns.n; k++) if (columns.detected[k] && !columns.cut[k] && !(columns.length_px[k] <= columns.length_px[best])) best = k;
   const picture = shoot({ frame: best, label: say("desk.view.label", { view }), hasMarks: true, around_px: columns.detected[best] ? [...columns.box_px.subarray(4 * best, 4 * best + 4)] : undefined });
   const sentence = sure === undefined ? say("desk.view.given", { view }) : say("desk.view.guess", { view, share: percent(sure) });
-  return card(sure < 0.9 ? "is-advice" : "is-fact", picture, sentence, [{ name: other, act: () => measureRemeasure("", { view: other }) }]);
+  return card(sure < 0.9 ? "is-advice" : "is-fact", picture, sentence, [{ name: other, act: () => remeasure("", { view: other }) }]);
 }
 
 /** One thing that moves besides the animal. @param {import("./instrument.js").Instrument} desk @param {{kind: string, from_s: number, to_s: number, box_px: number[]}} mover @param {any} shoot @param {Acts} acts */
-function moverCard(desk, { kind, from_s, to_s, box_px }, shoot, { measureRemeasure }) {
+function moverCard(desk, { kind, from_s, to_s, box_px }, shoot, { remeasure }) {
   const frame = Math.min(desk.last(), Math.max(desk.first, desk.frameOf((from_s + to_s) / 2)));
   const [x, y, w, h] = box_px;
   const sentence = say(`desk.mover.${kind}`, { from: from_s.toFixed(1), to: to_s.toFixed(1) });
   // The box holds the thing at all times; elsewhere in time the animal may pass there.
   const ignored = [...(desk.library.params?.ignore ?? []), { box_px, from_s, to_s }];
   return card("is-mover", shoot({ frame, label: sentence, box_px, hasMarks: true }), sentence, [
-    { name: "ignore_this", act: () => measureRemeasure("ignore", { ignore: ignored }) },
-    { name: "this_one", act: () => { desk.goTo(frame); measureRemeasure("animal", { animal_at: { frame, at_px: [x + w / 2, y + h / 2] } }); } },
+    { name: "ignore_this", act: () => remeasure("ignore", { ignore: ignored }) },
+    { name: "this_one", act: () => { desk.goTo(frame); remeasure("animal", { animal_at: { frame, at_px: [x + w / 2, y + h / 2] } }); } },
     { name: "see_it", act: () => { desk.goTo(frame); document.querySelector("div.stage")?.scrollIntoView({ block: "nearest" }); } },
   ]);
 }

@@ -1,6 +1,6 @@
 // What all parts of the desk share: the moment, the part of the film that the plots show, and the measurements.
 // @ts-check
-import { problemFrom } from "../app/api.js";
+import { problemFrom, unreachable } from "../app/api.js";
 import { signal } from "../app/store.js";
 import { emptyColumns, firstFrame, frameAt } from "./columns.js";
 
@@ -59,13 +59,14 @@ export function createInstrument(library, t, life) {
     if (data.library) facts.set(data.library);
     if (data.head) head.set(data.head);
     if (data.columns) columns.set(data.columns);
-    if (data.failed) failure.set(problemFrom(data.failed.text, data.failed.status));
+    if (data.failed) failure.set(data.failed.status ? problemFrom(data.failed.text, data.failed.status) : unreachable());
     if (data.done) { isLoaded.set(true); goTo(moment.value); }
     if (data.done || data.failed) worker.terminate();
   };
+  worker.onerror = () => failure.set(unreachable());
   worker.postMessage({ base: `${location.origin}/v1/libraries/${library.id}`, most: n, fps: library.fps, length_px: library.length_px ?? null });
   life.addEventListener("abort", () => worker.terminate());
-  goTo(t * library.fps + 1e-6 < 0 ? 0 : Math.floor(t * library.fps + 1e-6));
+  goTo(Math.floor(t * library.fps + 1e-6));
 
   return { library, life, start_s, end_s, moment, columns, facts, head, failure, isLoaded, span, showsMirrored, jump, first, last, count, goTo, timeOf, frameOf, showSpan };
 }

@@ -1,6 +1,6 @@
 // Keys of the desk.
 // @ts-check
-import { hearKeys } from "../parts/keys.js";
+import { listenForKeys } from "../parts/keys.js";
 
 /**
  * @param {AbortSignal} life
@@ -8,7 +8,7 @@ import { hearKeys } from "../parts/keys.js";
  */
 export function startKeys(life, { player, desk, axis, nextJump, focusFrame }) {
   const jump = (/** @type {number} */ frame) => () => { player.pause(); desk.goTo(frame); };
-  hearKeys(life, {
+  listenForKeys(life, {
     " ": player.toggle,
     ArrowLeft: (event) => player.move(event.shiftKey ? -10 : -1),
     ArrowRight: (event) => player.move(event.shiftKey ? 10 : 1),

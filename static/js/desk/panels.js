@@ -16,17 +16,17 @@ export const TABS = ["jumps", "patches", "pose", "trust", "size"];
 
 /**
  * @param {import("./instrument.js").Instrument} desk
- * @param {{player: any, pictures: any, shoot: any, tab: string, measureRemeasure: (tool?: string) => void}} parts
+ * @param {{player: any, pictures: any, shoot: any, tab: string, remeasure: (tool?: string) => void}} parts
  */
-export function createPanels(desk, { player, pictures, shoot, tab, measureRemeasure }) {
+export function createPanels(desk, { player, pictures, shoot, tab, remeasure }) {
   const chosen = signal(TABS.includes(tab) ? tab : TABS[0]);
   /** @type {Record<string, () => HTMLElement>} */
   const make = {
     jumps: () => element("div.panel-jumps", {}, createMatrix(desk, { player, pictures }), element("details", {}, element("summary", {}, say("desk.jumps.best")), jumpTable(desk, player))),
     patches: () => patchPanel(desk, { player, pictures, chosen }),
     pose: () => pathPanel(desk, player),
-    trust: () => trustPanel(desk, { player, shoot, measureRemeasure }),
-    size: () => sizePanel(desk, measureRemeasure),
+    trust: () => trustPanel(desk, { player, shoot, remeasure }),
+    size: () => sizePanel(desk, remeasure),
   };
   const panels = TABS.map((name) => element(`div.panel#panel-${name}`, { role: "tabpanel", tabIndex: -1, "aria-labelledby": `tab-${name}`, hidden: true }));
   const tabs = TABS.map((name) => element(`button.tab#tab-${name}`, { type: "button", role: "tab", "aria-controls": `panel-${name}`, onclick: () => chosen.set(name) }, say(`desk.tab.${name}`)));
@@ -84,8 +84,8 @@ function pathPanel(desk, player) {
   return element("div.panel-pose", {}, element("div.path-room", {}, canvas), element("p.path-key", {}, element("span", {}, say("desk.path.start")), element("i"), element("span", {}, say("desk.path.end")), element("span.soft", {}, say("desk.path.help"))), compassRoom);
 }
 
-/** Where the measurement is sure, and the moments to look at. @param {import("./instrument.js").Instrument} desk @param {{player: any, shoot: any, measureRemeasure: (tool?: string) => void}} parts */
-function trustPanel(desk, { player, shoot, measureRemeasure }) {
+/** Where the measurement is sure, and the moments to look at. @param {import("./instrument.js").Instrument} desk @param {{player: any, shoot: any, remeasure: (tool?: string) => void}} parts */
+function trustPanel(desk, { player, shoot, remeasure }) {
   const room = element("div.panel-trust", {}, element("p.soft", {}, say("desk.reading.wait")));
   const fill = () => {
     if (!desk.isLoaded.value) return;
@@ -98,20 +98,20 @@ function trustPanel(desk, { player, shoot, measureRemeasure }) {
       return element("li", {}, element("button.quiet", { type: "button", onclick: () => { player.pause(); desk.goTo(frame); } }, shoot({ frame, label: words, hasMarks: true, around_px }), element("span", {}, words)));
     });
     room.replaceChildren(...[element("ul.shares", {}, ...bars), element("h3", {}, say("desk.trust.look")), moments.length ? element("ul.weak", {}, ...rows) : element("p.soft", {}, say("desk.trust.fine")),
-      moments.length > 0 && element("p.actions", {}, ...["head", "animal"].map((tool) => element("button.quiet", { type: "button", onclick: () => measureRemeasure(tool) }, say(`desk.trust.${tool}_at`))))].filter(Boolean));
+      moments.length > 0 && element("p.actions", {}, ...["head", "animal"].map((tool) => element("button.quiet", { type: "button", onclick: () => remeasure(tool) }, say(`desk.trust.${tool}_at`))))].filter(Boolean));
   };
   desk.isLoaded.watch(fill, desk.life);
   return room;
 }
 
-/** How large the animal is, and the way to centimetres. @param {import("./instrument.js").Instrument} desk @param {(tool?: string) => void} measureRemeasure */
-function sizePanel(desk, measureRemeasure) {
+/** How large the animal is, and the way to centimetres. @param {import("./instrument.js").Instrument} desk @param {(tool?: string) => void} remeasure */
+function sizePanel(desk, remeasure) {
   const room = element("div.panel-size");
   desk.head.watch((head) => {
     const length_px = desk.library.length_px;
     const camera = head?.camera;
     const size = length_px && camera ? say("desk.size.known", { cm: (100 * length_px) / camera.pane_px_per_m, px: length_px }) : length_px ? say("desk.size.px", { px: length_px }) : say("desk.size.none");
-    room.replaceChildren(element("p", {}, size), element("p.soft", {}, say(camera ? "desk.size.again" : "desk.size.help")), element("p", {}, element("button.quiet", { type: "button", onclick: () => measureRemeasure("ruler") }, say("desk.size.ruler"))));
+    room.replaceChildren(element("p", {}, size), element("p.soft", {}, say(camera ? "desk.size.again" : "desk.size.help")), element("p", {}, element("button.quiet", { type: "button", onclick: () => remeasure("ruler") }, say("desk.size.ruler"))));
   }, desk.life);
   return room;
 }

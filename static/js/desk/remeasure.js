@@ -3,7 +3,7 @@
 // @ts-check
 import { get, post } from "../app/api.js";
 import { element } from "../app/element.js";
-import { ended, expect } from "../app/jobs.js";
+import { ended } from "../app/jobs.js";
 import { signal } from "../app/store.js";
 import { count, say } from "../app/words.js";
 import { mendsOf } from "../parts/mend.js";
@@ -20,12 +20,13 @@ const TOOLS = ["animal", "head", "ignore", "ruler"];
  * Opens the dialog. @param {import("./instrument.js").Instrument} desk
  * @param {{player: import("./player.js").Player, results: HTMLElement, tool?: string, params?: any}} options
  */
-export async function measureRemeasure(desk, { player, results, tool: first = "animal", params = {} }) {
+export async function openRemeasure(desk, { player, results, tool: first = "animal", params = {} }) {
   const { library } = desk;
   player.pause();
   const closing = new AbortController();
   const life = closing.signal;
   const defaults = await defaultParams(desk.life);
+  if (document.querySelector("dialog.remeasure")) return;
   const former = { ...defaults, ...library.params };
   const draft = signal({ ...former, ...params, ignore: params.ignore ?? former.ignore ?? [] });
   const tool = signal(/** @type {any} */ (TOOLS.includes(first) ? first : "animal"));
@@ -96,7 +97,6 @@ async function defaultParams(life) {
 
 /** Shows an analysis while it runs, and its numbers beside the former ones. @param {import("./instrument.js").Instrument} desk */
 async function follow(desk, { begun: { job_id: jobId, library_id: libraryId }, params, results, player }) {
-  await expect(jobId);
   const card = jobCard({ id: jobId, kind: "analysis", subject: { kind: "footage", id: desk.library.footage_id } });
   results.replaceChildren(element("h2", {}, say("remeasure.title")), card);
   results.scrollIntoView({ block: "center" });
@@ -109,8 +109,8 @@ async function follow(desk, { begun: { job_id: jobId, library_id: libraryId }, p
     if (desk.life.aborted) return;
     if (/** @type {any} */ (reason).name === "AbortError") results.replaceChildren();
     else {
-      const mends = mendsOf(reason, (mend) => measureRemeasure(desk, { player, results, params: { ...params, ...mend } }));
-      const again = { label: say("remeasure.again"), act: () => measureRemeasure(desk, { player, results, params }) };
+      const mends = mendsOf(reason, (mend) => openRemeasure(desk, { player, results, params: { ...params, ...mend } }));
+      const again = { label: say("remeasure.again"), act: () => openRemeasure(desk, { player, results, params }) };
       results.replaceChildren(problemBox(reason, [...mends, again]));
     }
   }

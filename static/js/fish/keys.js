@@ -1,6 +1,6 @@
 // Keys of film and fish: those of the desk, and + - 0 for the 3-D view.
 // @ts-check
-import { hearKeys } from "../parts/keys.js";
+import { listenForKeys } from "../parts/keys.js";
 
 const FAR = 10;
 const ZOOM = 1.25;
@@ -10,7 +10,7 @@ const ZOOM = 1.25;
  * @param {{move: (frames: number) => void, go: (frame: number) => void, last: number, toggle: () => void, orbit?: import("./orbit.js").Orbit}} acts
  */
 export function startKeys(life, { move, go, last, toggle, orbit }) {
-  hearKeys(life, {
+  listenForKeys(life, {
     " ": toggle,
     ArrowLeft: ({ shiftKey }) => move(shiftKey ? -FAR : -1),
     ArrowRight: ({ shiftKey }) => move(shiftKey ? FAR : 1),

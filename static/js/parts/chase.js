@@ -65,5 +65,5 @@ export function chase(flock, libraryId, life, { isOn = () => true, onEnd } = {})
   };
   for (const name of ["pointermove", "pointerdown"]) flock.canvas.addEventListener(name, /** @type {any} */ (move), { signal: life });
   for (const name of ["pointerleave", "pointercancel"]) flock.canvas.addEventListener(name, end, { signal: life });
-  life.addEventListener("abort", () => flee?.stop());
+  life.addEventListener("abort", () => { clearTimeout(resting); flee?.stop(); });
 }

@@ -57,7 +57,7 @@ export function fileButton(label, { camera = false } = {}) {
 
 /**
  * Sends films and starts their analyses. One film's place is shown once it has arrived; of several, the place
- * of all films. Who has gone elsewhere meanwhile stays there. @param {File[]} files
+ * of all films. If the person has left the place meanwhile, it is not changed. @param {File[]} files
  */
 export async function measureAll(files) {
   if (!files.length) return;
@@ -72,7 +72,7 @@ export async function measureAll(files) {
     const footage = await send(file).catch(() => null);
     if (!footage) return false;
     const show = isOne && location.pathname === from;
-    if (await isMeasured(footage.id)) {
+    if (await isMeasured(footage.id).catch(() => false)) {
       if (show) go(`/films/${footage.id}`, { isKnown: true });
     } else await measure(footage.id, {}, { show });
     return true;
@@ -83,7 +83,7 @@ export async function measureAll(files) {
 }
 
 /** @param {string} footageId */
-const isMeasured = async (footageId) => (await list("/v1/libraries?limit=100")).items.some((library) => library.footage_id === footageId);
+const isMeasured = async (footageId) => (await list(`/v1/libraries?footage_id=${footageId}&limit=1`)).items.length > 0;
 
 /**
  * Starts an analysis and shows its film. The tray tells why if it cannot start.

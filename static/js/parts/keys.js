@@ -2,11 +2,11 @@
 // @ts-check
 
 /**
- * Listens for keys until `life` ends. A field, an open dialog, and a button for Space keep theirs.
+ * Listens for keys until `life` ends. Fields and open dialogs keep their keys, and buttons keep Space.
  * @param {AbortSignal} life @param {Record<string, (event: KeyboardEvent) => void>} acts what each key does, by its
  *   name; letters are small
  */
-export function hearKeys(life, acts) {
+export function listenForKeys(life, acts) {
   document.addEventListener("keydown", (event) => {
     if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || isTaken(event)) return;
     const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];

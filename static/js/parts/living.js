@@ -43,6 +43,11 @@ export async function living({ libraryId, plan, life, small = false, pictures = 
   /** @type {any} */
   let player = null;
   const drawer = await createDrawer(canvas, sceneOf(plan, atlas, picture), { onResize: () => player?.redraw() });
+  if (life.aborted) {
+    drawer.dispose();
+    atlas.close();
+    throw life.reason;
+  }
   player = createPlayer(drawer, planSource(plan, atlas), { onFrame, onState });
   const detach = attach(canvas, player);
   const tell = async () => canvas.setAttribute("aria-label", await sentence(plan, player.frame));

@@ -2,6 +2,7 @@
 // @ts-check
 import { remove } from "../app/api.js";
 import { element } from "../app/element.js";
+import { forget } from "../app/names.js";
 import { signal } from "../app/store.js";
 import { say } from "../app/words.js";
 
@@ -50,6 +51,7 @@ export function deleteLater({ id, path, name }) {
     if (!waiting.delete(path)) return;
     try {
       await remove(path);
+      forget(path);
       close();
     } catch (problem) {
       if (/** @type {any} */ (problem).status === 404) return close();

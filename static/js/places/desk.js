@@ -39,18 +39,17 @@ export async function show(root, { id, query, life }) {
   const transport = createTransport(desk, { player, nextJump });
   const axis = createTimeAxis(desk, player, [...createPlots(desk), createArcs(desk)]);
   const results = element("section.results", { "aria-live": "polite" });
-  const measureRemeasure = async (tool = "", params = {}) => {
-    const dialog = await import("../desk/remeasure.js");
-    await dialog.measureRemeasure(desk, { player, results, tool, params }).catch((problem) => showProblem(results, problem));
-  };
-  const panels = createPanels(desk, { player, pictures, shoot, tab: query.get("tab") ?? "", measureRemeasure });
+  const remeasure = (tool = "", params = {}) => import("../desk/remeasure.js")
+    .then(({ openRemeasure }) => openRemeasure(desk, { player, results, tool, params }))
+    .catch((problem) => { if (!life.aborted) showProblem(results, problem); });
+  const panels = createPanels(desk, { player, pictures, shoot, tab: query.get("tab") ?? "", remeasure });
   const showTab = (/** @type {string} */ tab) => { panels.chosen.set(tab); panels.node.scrollIntoView({ block: "nearest" }); panels.node.querySelector(`#tab-${tab}`)?.focus({ preventScroll: true }); };
   const numbers = element("div");
   const failure = element("div");
 
   root.append(
     element("header.place-head", {}, element("h1", { tabIndex: -1 }, filmName(library)),
-      element("p.actions", {}, element("a.button", { href: `/libraries/${id}/studio` }, say("desk.studio")), element("a.button.quiet", { href: `/libraries/${id}/fish` }, say("desk.fish")), element("a.button.quiet", { href: `/films/${library.footage_id}` }, say("desk.the_film")), element("button.quiet#measure-again", { type: "button", onclick: () => measureRemeasure("", {}) }, say("remeasure.title")))),
+      element("p.actions", {}, element("a.button", { href: `/libraries/${id}/studio` }, say("desk.studio")), element("a.button.quiet", { href: `/libraries/${id}/fish` }, say("desk.fish")), element("a.button.quiet", { href: `/films/${library.footage_id}` }, say("desk.the_film")), element("button.quiet#measure-again", { type: "button", onclick: () => remeasure("", {}) }, say("remeasure.title")))),
     failure,
     element("div.desk-pair", {},
       element("section.desk-film", { "aria-label": say("desk.film") }, stage.node, stage.controls, transport.node, transport.reading),
@@ -58,7 +57,7 @@ export async function show(root, { id, query, life }) {
       panels.node),
     results,
     element("section", {}, element("h2", {}, say("desk.numbers")), numbers),
-    element("section", {}, element("h2", {}, say("desk.advice")), element("p.soft", {}, say("desk.advice.help")), adviceCards(desk, { pictures, shoot, acts: { measureRemeasure, showTab } })),
+    element("section", {}, element("h2", {}, say("desk.advice")), element("p.soft", {}, say("desk.advice.help")), adviceCards(desk, { pictures, shoot, acts: { remeasure, showTab } })),
     element("section", {}, element("h2", {}, say("desk.files")), downloadTable(library)));
 
   const tellNumbers = () => numbers.replaceChildren(numberList({ library, facts: desk.facts.value, head: desk.head.value }));

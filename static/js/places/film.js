@@ -37,7 +37,7 @@ export async function show(root, { id, life, state }) {
   const job = await jobOf(id, state?.job, life);
   // The place is shown now: the router need not wait for the end of the job to set the focus.
   if (job) return void follow(job, parts);
-  const library = (await list("/v1/libraries?limit=100", life)).items.find((one) => one.footage_id === id);
+  const [library] = (await list(`/v1/libraries?footage_id=${id}&limit=1`, life)).items;
   if (library) return showMeasured(library.id, parts, state?.isKnown ? say("film.known") : "");
   showFilm(parts);
   return offer(parts, say("film.not_measured"));

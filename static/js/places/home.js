@@ -51,7 +51,7 @@ export async function show(root, { life }) {
   const hear = (/** @type {any[]} */ all) => {
     if (!ready.value) return;
     const running = all.filter(isUnderWay);
-    if (shown === "") showWaiting(stage, running);
+    if (shown === "") showWaiting(stage, running).catch(() => {});
     const done = all.filter((job) => job.state === "done").length;
     if (done === n_done) return;
     n_done = done;

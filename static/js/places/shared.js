@@ -1,5 +1,6 @@
 // A reel for friends: the film and its figures by a signed link, without a token.
 // @ts-check
+import { unreachable } from "../app/api.js";
 import { element } from "../app/element.js";
 import { replaceAddress, setTitle } from "../app/router.js";
 import { day, say, seconds } from "../app/words.js";
@@ -18,7 +19,7 @@ export async function show(root, { id, query, life }) {
   if (link.expires_s * 1000 <= Date.now()) return refuse(root, "shared.over", { time: day(new Date(link.expires_s * 1000).toISOString()) });
   const [source, planned] = link.files;
   // Without the sign-in form: a friend has no token.
-  const answer = await fetch(planned, { signal: life });
+  const answer = await fetch(planned, { signal: life }).catch((error) => { throw error.name === "AbortError" ? error : unreachable(); });
   if (!answer.ok) return refuse(root, "shared.gone");
   const plan = decodePlan(await answer.arrayBuffer());
   const size = plan.head.params?.render?.size_px ?? plan.sizePx;

@@ -95,7 +95,7 @@ export async function show(root, { id, query, life }) {
       facts.update(plan);
     },
     onProblem: (problem) => {
-      if (view.plan) view.show(view.plan);
+      if (view.plan) view.show(view.plan).catch(() => {});
       trouble.replaceChildren(problemBox(problem, settings.canUndo ? [{ label: say("tool.undo"), act: settings.undo }] : [{ label: say("studio.again"), act: () => again.click() }]));
     },
   });
