@@ -81,7 +81,7 @@ def closed_service(tmp_path):
     """Address of a service that requires tokens, a valid token, and its data folder."""
     data = tmp_path / "data"
     with started(PROGRAM, data, "--auth", "required") as address:
-        yield address, token(data, "create", "--name", "page"), data
+        yield address, token(data, "create", "--name", "page", "--owner", "page"), data
 
 
 def token(data, *arguments):

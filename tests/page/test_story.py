@@ -119,7 +119,8 @@ def english_of(page):
 def test_the_whole_story_in_japanese_has_no_english(visitor, empty_service, other_film):
     page = visitor(locale="ja-JP")
     page.goto(empty_service)
-    assert page.evaluate("document.documentElement.lang") == "ja"
+    until(page, "document.documentElement.lang === 'ja'")
+    settle(page)
     assert english_of(page) == []
     choose_film(page, other_film)
     expect(page).to_have_url(re.compile("/films/"), timeout=LONG_MS)
@@ -147,9 +148,11 @@ def test_the_whole_story_in_japanese_has_no_english(visitor, empty_service, othe
 def test_the_language_follows_the_browser_until_one_is_chosen(visitor, empty_service, locale, language):
     page = visitor(locale=locale)
     page.goto(empty_service)
+    heading(page).wait_for()
     assert page.evaluate("document.documentElement.lang") == language
     other = {"en": "ja", "ja": "en"}[language]
     page.get_by_role("button", name={"en": "English", "ja": "日本語"}[other]).click()
     until(page, f"document.documentElement.lang === '{other}'")
     page.reload()
+    heading(page).wait_for()
     assert page.evaluate("document.documentElement.lang") == other

@@ -149,6 +149,7 @@ def test_a_session_that_ends_in_the_middle_is_renewed_in_the_same_place(page, cl
     sign_in(page, token(data, "create", "--name", "again", "--owner", "page"))
     expect(page.get_by_role("button", name=say(page, "session.end"))).to_be_visible()
     assert page.url == place
+    expect(flock_canvas(page)).to_have_accessible_name(said(page, "living.n", n=4), timeout=LOAD_MS)
 
 
 def test_a_token_that_may_only_read_is_told_what_it_may_not(page, closed_service, other_film):
