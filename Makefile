@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test crash-test soak arm-test docs deny bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -16,7 +16,7 @@ help: ## list the commands
 run: build ## install missing packages, build, and start the service with its page
 	$(RELEASE) serve --bind $(BIND) --data $(DATA)
 
-test: unit scale-test truth-test page-test contract-test ## install the packages that tests need, and run all tests
+test: unit scale-test truth-test page-test contract-test crash-test ## install the packages that tests need, and run all tests
 	@echo "all tests passed"
 
 demo: build ## film -> library -> flock.mp4, without a server
@@ -26,7 +26,7 @@ demo: build ## film -> library -> flock.mp4, without a server
 	$(RELEASE) flock target/demo/library -o flock.mp4 --count 20 --frames 400
 	@echo "the flock is in flock.mp4"
 
-check: fmt clippy unit scale-test truth-test page-test contract-test docs deny ## run all checks of CI
+check: fmt clippy unit scale-test truth-test page-test contract-test crash-test docs deny ## run all checks of CI
 	@echo "all checks passed"
 
 fmt: ## check the formatting
@@ -68,6 +68,12 @@ page-test: vendor ## test the page in a browser, against a running service
 contract-test: target/vendor ## test the API against its OpenAPI document, with schemathesis
 	$(CARGO) test --locked --workspace --no-run
 	@scripts/python-tests.sh contract $(DEBUG)
+
+crash-test: target/vendor ## lose the power, and let steps of the service fail: make crash-test [CASES=all]
+	$(CARGO) test --locked --workspace --no-run
+	@scripts/system-packages.sh test contract-test
+	python3 -B tests/crash/power_loss.py $(DEBUG)
+	python3 -B tests/crash/failure_steps.py $(DEBUG) $(if $(filter all,$(CASES)),,--cases $(or $(CASES),16))
 
 soak: target/vendor ## kill the service two hundred times during uploads
 	FLOCKREEL_KILLS=200 $(CARGO) test --locked --test it -- jobs::uploads

@@ -161,7 +161,6 @@ mod tests {
     #[test]
     fn paths_not_listed_need_a_caller() {
         for path in [
-            "/",
             "/static/js/main.js",
             "/vendor/x.js",
             "/v1/session",
