@@ -168,7 +168,7 @@ def test_an_obstacle_drawn_on_the_picture_is_not_entered(studio, filled_service)
 def test_a_drawn_path_becomes_a_predator_for_the_whole_length(studio, filled_service):
     page, previews = studio
     expect_animals(page, 6)
-    page.get_by_role("button", name="Flee").click()
+    page.get_by_role("button", name=say(page, "tool.predator")).click()
     drag(page, [(0.1, 0.2), (0.4, 0.8), (0.6, 0.2), (0.9, 0.7)])
     expect(page.locator("#flee")).to_have_value("path")
     expect_animals(page, 6)
