@@ -121,9 +121,18 @@ pub struct Storage {
 /// The workers of a process.
 #[derive(Args, Clone, Debug)]
 pub struct JobSettings {
-    /// Number of jobs that run at once. They share the processor cores.
+    /// Number of jobs that run at once. They share the processor cores. From 2 on, one of them is a small job, or
+    /// none.
     #[arg(long, env = "FLOCKREEL_WORKERS", default_value_t = default_workers(), value_name = "N")]
     pub workers: NonZeroUsize,
+    /// Memory limit of one job without its media tools, bytes. A job that exceeds it fails with `memory_limit`.
+    #[arg(
+        long,
+        env = "FLOCKREEL_JOB_MEMORY_BYTES",
+        default_value_t = JobSettings::JOB_MEMORY_BYTES,
+        value_name = "N"
+    )]
+    pub job_memory_bytes: u64,
     /// Time limit of one job, seconds. A job that exceeds it fails with `time_limit`.
     #[arg(
         long,
@@ -193,16 +202,20 @@ impl Config {
 impl JobSettings {
     /// Default time limit of a job, seconds. An hour of footage takes a few hours on a small machine.
     pub const JOB_TIME_S: u64 = 6 * 3600;
+    /// Default memory limit of a job, bytes: as much as a media tool may use. The largest flock takes less than half.
+    pub const JOB_MEMORY_BYTES: u64 = 4 << 30;
 
-    /// Returns the number of threads that one worker may use: cores divided by workers, at least 1.
+    /// Returns the number of threads that one worker may use, as [`threads_per_worker`] does.
     pub fn threads_per_worker(&self) -> usize {
         threads_per_worker(self.workers)
     }
 }
 
-/// Returns the number of threads that each of `workers` workers may use, at least 1.
+/// Returns the number of threads that each of `workers` workers may use, at least 1. The worker for small jobs is
+/// mostly idle, so the others share the cores.
 pub fn threads_per_worker(workers: NonZeroUsize) -> usize {
-    (cores() / workers).max(1)
+    let n_large = (workers.get() - 1).max(1);
+    (cores() / n_large).max(1)
 }
 
 impl Storage {
@@ -274,10 +287,10 @@ impl std::fmt::Debug for Database {
     }
 }
 
-/// Returns the default number of workers: one for every two cores, at least 1. An analysis keeps two cores
-/// busy (decoder and tracking).
+/// Returns the default number of workers: one for every two cores, at least 1, and one for small jobs. An analysis
+/// keeps two cores busy (decoder and tracking).
 pub fn default_workers() -> NonZeroUsize {
-    NonZeroUsize::new(cores() / 2).unwrap_or(NonZeroUsize::MIN)
+    NonZeroUsize::MIN.saturating_add((cores() / 2).max(1))
 }
 
 /// Returns the number of cores that this process may use, at least 1.

@@ -28,7 +28,6 @@ mod uploads;
 
 use std::ops::Deref;
 use std::sync::Arc;
-use std::time::Duration;
 
 use axum::extract::{DefaultBodyLimit, Request, State};
 use axum::middleware::Next;
@@ -100,8 +99,7 @@ impl AppState {
     /// opened. A missing media tool is only logged.
     pub async fn open(config: Config) -> Result<AppState, store::Error> {
         let store = Store::open(config.storage.clone()).await?;
-        let mut context = Context::new(store, config.jobs.threads_per_worker());
-        context.budget = Duration::from_secs(config.jobs.job_time_s);
+        let mut context = Context::for_jobs(store, &config.jobs);
         context.max_queued = config.max_queued;
         context.min_free_bytes = Config::job_reserve_bytes(config.disk_reserve_bytes);
         recover(&context).await?;
@@ -195,6 +193,7 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(fish::get_fish_file))
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
+        .routes(routes!(jobs::retry::retry_job))
         .routes(routes!(jobs::get_refused_jpeg))
         .routes(routes!(jobs::events::get_job_events))
         .routes(routes!(jobs::events::get_events))

@@ -229,6 +229,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::TusVersionNotSupported | Code::PreconditionFailed => StatusCode::PRECONDITION_FAILED,
         Code::AlreadyFinished
         | Code::AlreadyStored
+        | Code::RetryRefused
         | Code::RequestInProgress
         | Code::OffsetDiffers => StatusCode::CONFLICT,
         Code::Unauthenticated => StatusCode::UNAUTHORIZED,

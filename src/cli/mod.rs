@@ -5,6 +5,7 @@
 //! for an internal failure.
 
 pub mod analyze;
+mod attempt;
 pub mod backup;
 pub mod check;
 pub mod check_plan;
@@ -105,6 +106,9 @@ enum Command {
     Sample(sample::Args),
     /// Check whether this machine has everything that flockreel needs, and explain what is missing.
     Doctor(doctor::Args),
+    /// Compute one attempt at a job; a worker starts this command and gives the order on stdin.
+    #[command(hide = true)]
+    Attempt(attempt::Args),
 }
 
 /// Result of a command: the line of JSON that `--json` prints.
@@ -124,7 +128,7 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
     // Services log all their events, other commands only warnings.
     let default = if serves { "info" } else { "warn" };
     let _log = logging::start(cli.log.as_deref().unwrap_or(default), cli.log_format);
-    if serves {
+    if serves || matches!(cli.command, Command::Attempt(_)) {
         logging::log_panics();
     }
     media::configure(&cli.media);
@@ -156,6 +160,7 @@ fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
         Command::Sprites(args) => sprites::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Doctor(args) => doctor::run(args, json),
+        Command::Attempt(args) => attempt::run(args),
     }
 }
 

@@ -4,8 +4,6 @@
 //! They share a PostgreSQL database and the stored files with a service, and communicate with it only through
 //! the queue.
 
-use std::time::Duration;
-
 use super::serve::{listen, wait_for_signal};
 use super::{Error, Summary};
 use crate::api;
@@ -46,10 +44,9 @@ async fn work(args: Args) -> Result<(), Error> {
     }
     super::check_sandbox()?;
     media::tool_version()?;
-    let (n_workers, threads) = (args.jobs.workers.get(), args.jobs.threads_per_worker());
+    let n_workers = args.jobs.workers.get();
     let store = Store::open_beside(args.storage).await?;
-    let mut context = Context::new(store, threads);
-    context.budget = Duration::from_secs(args.jobs.job_time_s);
+    let mut context = Context::for_jobs(store, &args.jobs);
     context.min_free_bytes = Config::job_reserve_bytes(Config::DISK_RESERVE_BYTES);
     recover(&context).await?;
     let stop = Stop::default();

@@ -118,7 +118,6 @@ mod tests {
     use super::*;
     use flockreel_core::code::Code;
     use flockreel_core::ids::JobId;
-    use flockreel_core::progress::Progress;
 
     #[test]
     fn attempt_is_counted_with_its_stages_and_frames() {

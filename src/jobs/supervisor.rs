@@ -10,7 +10,9 @@ use tokio::time::{sleep, timeout};
 
 use super::worker::{Step, Worker};
 use super::{Context, clock};
-use crate::store::{self, Store, jobs::JobState};
+use crate::store::jobs::JobState;
+use crate::store::jobs::claim::Lane;
+use crate::store::{self, Store};
 use flockreel_core::ids::JobId;
 
 /// Interval at which idle workers look for jobs, even without a notification. Free choice.
@@ -26,11 +28,19 @@ pub struct Supervisor {
 
 impl Supervisor {
     /// Starts `n_workers` workers, the rescue, the notifications, and the sweeps if this process serves the
-    /// data folder.
+    /// data folder. With two workers or more, one of them runs only small jobs.
     pub fn start(context: Context, n_workers: usize) -> Supervisor {
         let mut tasks = JoinSet::new();
-        for _ in 0..n_workers {
-            tasks.spawn(work(context.clone()));
+        for idx in 0..n_workers {
+            let lane = if idx > 0 && idx + 1 == n_workers {
+                Lane::Short
+            } else {
+                Lane::All
+            };
+            tasks.spawn(work(
+                Worker::in_lane(context.clone(), lane),
+                context.clone(),
+            ));
         }
         tasks.spawn(rescue(context.clone()));
         tasks.spawn(listen(context.clone()));
@@ -51,8 +61,7 @@ impl Supervisor {
     }
 }
 
-async fn work(context: Context) {
-    let worker = Worker::new(context.clone());
+async fn work(worker: Worker, context: Context) {
     while !context.draining.is_cancelled() {
         match worker.step().await {
             Ok(Step::Idle) => {
@@ -87,7 +96,8 @@ async fn rescue(context: Context) {
 }
 
 async fn rescue_expired(context: &Context) -> Result<Vec<(JobId, JobState)>, store::Error> {
-    context.store.rescue(context.now_ms().await?).await
+    let now_ms = context.now_ms().await?;
+    context.store.rescue(context.process, now_ms).await
 }
 
 /// Wakes a worker when any process has queued a job.
@@ -140,7 +150,7 @@ pub async fn recover(context: &Context) -> Result<(), store::Error> {
         context.store.rescue_all(now_ms).await?;
         context.store.interrupt_all_keys().await?;
     } else {
-        context.store.rescue(now_ms).await?;
+        context.store.rescue(context.process, now_ms).await?;
     }
     if context.store.serves() {
         context.store.sweep_upload_files().await?;

@@ -1,6 +1,7 @@
 //! Jobs: their state and cancellation, and the responses about jobs that other routes share.
 
 pub(super) mod events; // server-sent events
+pub(super) mod retry; // another attempt
 
 pub(super) mod wait; // Prefer: wait=N
 
@@ -43,6 +44,8 @@ pub(super) struct JobView {
     attempt: i64,
     /// Whether the job was asked to stop while running.
     cancel_requested: bool,
+    /// Whether `POST /v1/jobs/{id}/retry` would start the job again.
+    retriable: bool,
     /// Reason of the failure; null unless the job failed.
     error: Option<JobFailure>,
     /// Time at which the job was queued, RFC 3339 in UTC.
@@ -262,6 +265,7 @@ impl From<JobRow> for JobView {
             progress: row.progress,
             attempt: row.attempt,
             cancel_requested: row.cancel_requested,
+            retriable: row.is_retriable(),
             error: row.failure().map(|failure| JobFailure {
                 picture: row.has_picture.then(|| format!("{path}/{FILE_NAME}")),
                 code: failure.code.name(),

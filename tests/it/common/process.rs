@@ -207,6 +207,11 @@ impl Server {
         self.job_when(id, |job| !job["finished_at"].is_null()).await
     }
 
+    /// Returns the id of the process.
+    pub(crate) fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends SIGKILL and waits for the end.
     pub(crate) fn kill(mut self) {
         self.child.kill().unwrap();
@@ -261,10 +266,17 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
 /// Returns the command lines of all processes that mention the folder.
 pub(crate) fn processes_of(folder: &Path) -> Vec<String> {
     let folder = folder.to_str().unwrap();
+    let lines = command_lines().into_iter().map(|(_, line)| line);
+    lines.filter(|line| line.contains(folder)).collect()
+}
+
+/// Returns the ids and command lines of all processes.
+pub(crate) fn command_lines() -> Vec<(i32, String)> {
     let entries = std::fs::read_dir("/proc").unwrap().flatten();
     let lines = entries.filter_map(|entry| {
+        let pid = entry.file_name().to_str()?.parse().ok()?;
         let line = std::fs::read(entry.path().join("cmdline")).ok()?;
-        Some(String::from_utf8_lossy(&line).replace('\0', " "))
+        Some((pid, String::from_utf8_lossy(&line).replace('\0', " ")))
     });
-    lines.filter(|line| line.contains(folder)).collect()
+    lines.collect()
 }

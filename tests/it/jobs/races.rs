@@ -33,6 +33,7 @@ fn job(kind: Kind) -> NewJob {
         result_id: Uuid::now_v7(),
         after_job: None,
         priority: 0,
+        is_small: false,
         max_queued: i64::MAX,
     }
 }

@@ -1,8 +1,23 @@
-//! Time in which a child was ready to run, but other processes had the processors.
+//! Processor time of a child: what it used, and how long it waited while other processes had the processors.
 
 use std::time::Duration;
 
 use rustix::process::Pid;
+
+/// Unit of the times in `/proc/PID/stat`: USER_HZ, which is 100 Hz on all processors that we support.
+const TICK: Duration = Duration::from_millis(10);
+
+/// Returns the processor time of all threads of a process, also of one that has exited and is not reaped; zero if
+/// the kernel does not tell it.
+pub(super) fn processor_time(process: Pid) -> Duration {
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", process.as_raw_nonzero()));
+    let stat = stat.unwrap_or_default();
+    // The name of the program, in parentheses, may contain spaces. utime and stime are the fields 14 and 15.
+    let after_name = stat.rsplit(')').next().unwrap_or_default();
+    let fields = after_name.split_whitespace().skip(11).take(2);
+    let ticks: u32 = fields.filter_map(|field| field.parse::<u32>().ok()).sum();
+    TICK * ticks
+}
 
 /// Returns how long the thread of a process that waited longest for a processor did so; zero if the kernel does
 /// not count it (`/proc/PID/task/TID/schedstat`: running, waiting, slices; nanoseconds).
@@ -21,6 +36,15 @@ mod tests {
     use std::time::Instant;
 
     use super::*;
+
+    #[test]
+    fn processor_time_grows_while_a_process_computes() {
+        let process = rustix::process::getpid();
+        let (before, start) = (processor_time(process), Instant::now());
+        while processor_time(process) < before + 2 * TICK {
+            assert!(start.elapsed() < Duration::from_secs(60), "it never grows");
+        }
+    }
 
     #[test]
     fn threads_that_share_processors_wait_for_them() {

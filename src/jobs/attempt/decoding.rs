@@ -2,19 +2,19 @@
 
 use std::time::{Duration, Instant};
 
-use super::Listener;
+use super::Reporter;
 use flockreel_core::footage::{FootageFormat, FrameSource, FrameStream, SourceError, Visit};
 use flockreel_core::raster::Frame;
 
-/// A video source that reports its frames and its reading time to the listener.
-pub(super) struct Counted<'a, S: ?Sized> {
+/// A video source that reports its frames and its reading time.
+pub(in crate::jobs) struct Counted<'a, S: ?Sized> {
     source: &'a S,
-    listener: &'a Listener,
+    reporter: &'a Reporter,
 }
 
 impl<'a, S: FrameSource + ?Sized> Counted<'a, S> {
-    pub(super) fn new(source: &'a S, listener: &'a Listener) -> Counted<'a, S> {
-        Counted { source, listener }
+    pub(in crate::jobs) fn new(source: &'a S, reporter: &'a Reporter) -> Counted<'a, S> {
+        Counted { source, reporter }
     }
 }
 
@@ -26,7 +26,7 @@ impl<S: FrameSource + ?Sized> FrameSource for Counted<'_, S> {
     fn open(&self) -> Result<Box<dyn FrameStream + '_>, SourceError> {
         Ok(Box::new(CountedStream {
             stream: self.source.open()?,
-            listener: self.listener,
+            reporter: self.reporter,
             n_frames: 0,
             took: Duration::ZERO,
         }))
@@ -39,7 +39,7 @@ impl<S: FrameSource + ?Sized> FrameSource for Counted<'_, S> {
 
 struct CountedStream<'a> {
     stream: Box<dyn FrameStream + 'a>,
-    listener: &'a Listener,
+    reporter: &'a Reporter,
     n_frames: u64,
     took: Duration,
 }
@@ -56,6 +56,6 @@ impl FrameStream for CountedStream<'_> {
 
 impl Drop for CountedStream<'_> {
     fn drop(&mut self) {
-        self.listener.count_decoded(self.n_frames, self.took);
+        self.reporter.count_decoded(self.n_frames, self.took);
     }
 }
