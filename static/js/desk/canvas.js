@@ -50,7 +50,7 @@ export function drawnCanvas(life, draw, props = {}) {
   };
   const observer = new ResizeObserver(ask);
   observer.observe(canvas);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colors = null; ask(); }, { signal: life });
+  addEventListener("theme", () => { colors = null; ask(); }, { signal: life });
   life.addEventListener("abort", () => observer.disconnect());
   return { canvas, ask };
 }

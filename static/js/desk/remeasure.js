@@ -64,7 +64,7 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   const form = element("form", { method: "dialog" },
     element("header.place-head", {}, element("h2", {}, say("remeasure.title")), element("button.quiet", { type: "button", onclick: () => dialog.close() }, say("cancel"))),
     element("div.remeasure-columns", {},
-      element("div.remeasure-left", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("remeasure.tools")), ...radios), help, element("div.remeasure-room", {}, picture), frame, size, marks),
+      element("div.remeasure-left", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("remeasure.tools")), ...radios), help, element("div.remeasure-box", {}, picture), frame, size, marks),
       element("div.remeasure-right", {}, choice(draft, "view", [null, "side", "top"]), choice(draft, "follow", ["one", "largest"]), slide(draft, "threshold", { min: 1, max: 100, step: 1 }), part(draft, desk), slide(draft, "kappa", { min: 1, max: 6, step: 0.5 }), choice(draft, "sprites", ["auto", "always"]),
         element("label.field", {}, say("remeasure.preset"), presets, element("small", {}, say("remeasure.preset.help"))))),
     element("footer.remeasure-foot", {}, sent, problem, start));

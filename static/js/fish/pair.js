@@ -1,6 +1,7 @@
 // Film and virtual fish side by side with one play head.
 // @ts-check
 import { element } from "../app/element.js";
+import { isCalm } from "../app/motion.js";
 import { say } from "../app/words.js";
 import { timeline } from "../parts/timeline.js";
 import { film } from "../reel/film.js";
@@ -8,7 +9,7 @@ import { createFlat } from "./flat.js";
 import { startKeys } from "./keys.js";
 import { filmLens } from "./lens.js";
 import { createWireframe } from "./wireframe.js";
-import { postureAt, roomOf } from "./posture.js";
+import { postureAt, boundsOf } from "./posture.js";
 import { createSpace, directionText } from "./space.js";
 
 /**
@@ -72,9 +73,9 @@ export function createPair({ library, id, fish, startFrame, life, onRest }) {
   time.setSpan(n, fps);
   show(startFrame ?? 0);
   if (startFrame !== null) player.seek(frame);
-  if (startFrame === null && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.play();
+  if (startFrame === null && !isCalm()) player.play();
   return node;
 }
 
 /** Returns the farthest depth of the fish, metres. @param {import("./glb.js").VirtualFish} fish */
-const reachOf = (fish) => Math.max(1e-3, -roomOf(fish).low[2]);
+const reachOf = (fish) => Math.max(1e-3, -boundsOf(fish).low[2]);

@@ -42,7 +42,7 @@ async function save(event, href, download) {
 }
 
 /** Returns what a virtual fish is, in a few words. @param {any} fish */
-export const fishName = ({ params }) => [choiceOf("palette", params.palette ?? ""), params.swim === false && say("fish.rigid"), params.bank_rad === 0 && say("fish.upright")].filter(Boolean).join(", ");
+const fishName = ({ params }) => [choiceOf("palette", params.palette ?? ""), params.swim === false && say("fish.rigid"), params.bank_rad === 0 && say("fish.upright")].filter(Boolean).join(", ");
 
 /**
  * Returns the table of the fish of a film with their downloads.
@@ -71,5 +71,5 @@ export function versionTable(all, { library, shown, life, onDelete }) {
   });
   const heads = ["which", "model", "film", "size", "delete"].map((name) => element("th", { scope: "col" }, name === "delete" ? element("span.unseen", {}, say("reel.delete")) : say(`fish.table.${name}`)));
   return element("section", {}, element("h2", {}, say("fish.files")), element("p.soft", {}, say("fish.files.help")),
-    element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("fish.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
+    element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("fish.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
 }

@@ -18,11 +18,11 @@ const MOST_ZOOM = 2;
 /**
  * The canvas takes the shape of the picture; its style decides the size. All scenes have pictures of one size.
  * @param {HTMLCanvasElement} canvas @param {Scene} scene
- * @param {{kind?: "2d", onResize?: () => void}} [options] kind "2d" does without WebGL
+ * @param {{onResize?: () => void}} [options]
  * @returns {Promise<Drawer>}
  */
-export async function createDrawer(canvas, scene, { kind, onResize = () => {} } = {}) {
-  const drawer = (kind !== "2d" && glDrawer(canvas, scene)) || (await import("./canvas2d.js")).canvasDrawer(canvas, scene);
+export async function createDrawer(canvas, scene, { onResize = () => {} } = {}) {
+  const drawer = glDrawer(canvas, scene) ?? (await import("./canvas2d.js")).canvasDrawer(canvas, scene);
   const [width, height] = scene.sizePx;
   const fit = () => {
     const zoom = Math.min(MOST_ZOOM, Math.min(canvas.clientWidth / width, canvas.clientHeight / height) * devicePixelRatio || 1);

@@ -59,7 +59,7 @@ export function fileButton(label, { camera = false } = {}) {
  * Sends films and starts their analyses. One film's place is shown once it has arrived; of several, the place
  * of all films. If the person has left the place meanwhile, it is not changed. @param {File[]} files
  */
-export async function measureAll(files) {
+async function measureAll(files) {
   if (!files.length) return;
   openTray();
   const sender = await import("../app/upload.js").catch(() => null);

@@ -21,6 +21,6 @@ function isTaken({ key, target }) {
   const node = /** @type {HTMLElement} */ (target);
   if (document.querySelector("dialog[open]")) return true;
   if (node.matches?.("input:not([type=checkbox]):not([type=radio]), select, textarea")) return true;
-  if (node.matches?.("[role=tab], input[type=radio], .table-room") && (key.startsWith("Arrow") || key === "Home" || key === "End")) return true;
+  if (node.matches?.("[role=tab], input[type=radio], .table-scroll") && (key.startsWith("Arrow") || key === "Home" || key === "End")) return true;
   return key === " " && Boolean(node.closest?.("button, a, summary, input, [role=button]"));
 }

@@ -11,7 +11,7 @@ const POINTS = 240;
 const ROWS = 12;
 
 /** Returns whether a key belongs to the focused element. @param {EventTarget | null} target */
-const takesKeys = (target) => target instanceof Element && target.closest("input, select, textarea, button, summary, a, pre, .table-room, [contenteditable], [role=tab]") !== null;
+const takesKeys = (target) => target instanceof Element && target.closest("input, select, textarea, button, summary, a, pre, .table-scroll, [contenteditable], [role=tab]") !== null;
 
 /**
  * @typedef {{node: HTMLElement, setFrame: (frame: number) => void, setPlaying: (isPlaying: boolean) => void,

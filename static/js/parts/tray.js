@@ -21,9 +21,8 @@ export function fillTray() {
   tray.addEventListener("click", (/** @type {any} */ event) => { if (event.target.closest("a[href]")) tray.hidePopover(); });
   const draw = () => {
     const running = jobs.value.filter(isUnderWay);
-    const sending = uploads.value.filter((one) => one.state !== "done");
     const shown = [...running, ...jobs.value.filter((job) => !isUnderWay(job)).slice(0, ENDED)];
-    reconcile(list, [...sending.map((one) => ({ key: `upload-${one.id}`, draw: uploadCard, of: one })), ...shown.map((job) => ({ key: job.id, draw: jobCard, of: job }))]);
+    reconcile(list, [...uploads.value.map((one) => ({ key: `upload-${one.id}`, draw: uploadCard, of: one })), ...shown.map((job) => ({ key: job.id, draw: jobCard, of: job }))]);
     if (!list.childElementCount) list.append(element("p.soft", {}, say("tray.empty")));
   };
   jobs.watch(draw);

@@ -1,4 +1,5 @@
-// Deleting with a way back: the thing vanishes at once, and is deleted when the time to undo is over.
+// Deletions that can be undone: the thing vanishes from the page at once. The service deletes it when the time to
+// undo is over.
 // @ts-check
 import { remove } from "../app/api.js";
 import { element } from "../app/element.js";
@@ -7,7 +8,7 @@ import { signal } from "../app/store.js";
 import { say } from "../app/words.js";
 
 /** Time in which a deletion can be undone, ms. */
-export const UNDO_MS = 10_000;
+const UNDO_MS = 10_000;
 
 /** Ids of things that are deleted or about to be. Lists leave them out. @type {import("../app/store.js").Signal<Set<string>>} */
 export const deleted = signal(new Set());

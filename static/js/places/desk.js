@@ -32,7 +32,7 @@ export async function show(root, { id, query, life }) {
   setTitle(say("desk.title", { film: filmName(library) }));
   const desk = createInstrument(library, Number(query.get("t")) || 0, life);
   const player = createPlayer(desk);
-  const pictures = createPictures(desk, { library });
+  const pictures = createPictures(desk);
   const shoot = createShots(desk);
   const nextJump = jumpPlayer(desk, player);
   const stage = createStage(desk, { player, pictures });

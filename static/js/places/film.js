@@ -3,13 +3,14 @@
 import { get, list } from "../app/api.js";
 import { element } from "../app/element.js";
 import { ended, isUnderWay, jobs, ready, resultOf } from "../app/jobs.js";
+import { isCalm } from "../app/motion.js";
 import { filmName } from "../app/names.js";
 import { go, setTitle } from "../app/router.js";
 import { sent } from "../app/upload.js";
 import { count, say, seconds } from "../app/words.js";
 import { filmPicture } from "../parts/cards.js";
 import { measure } from "../parts/drop.js";
-import { isCalm, showFlock } from "../parts/hero.js";
+import { showFlock } from "../parts/hero.js";
 import { preview } from "../parts/living.js";
 import { mendsOf } from "../parts/mend.js";
 import { problemBox, showProblem } from "../parts/problem.js";

@@ -3,11 +3,12 @@
 import { list } from "../app/api.js";
 import { element } from "../app/element.js";
 import { isUnderWay, jobs, ready } from "../app/jobs.js";
+import { isCalm } from "../app/motion.js";
 import { remember, thing } from "../app/names.js";
 import { setTitle } from "../app/router.js";
 import { say } from "../app/words.js";
 import { fileButton } from "../parts/drop.js";
-import { isCalm, setBack, showFlock } from "../parts/hero.js";
+import { setBack, showFlock } from "../parts/hero.js";
 import { planOf, preview } from "../parts/living.js";
 
 /** Length of the flock of a library that has none yet, and number of recent cards. */

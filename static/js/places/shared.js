@@ -2,6 +2,7 @@
 // @ts-check
 import { unreachable } from "../app/api.js";
 import { element } from "../app/element.js";
+import { isCalm } from "../app/motion.js";
 import { replaceAddress, setTitle } from "../app/router.js";
 import { day, say, seconds } from "../app/words.js";
 import { decodePlan } from "../flock/plan.js";
@@ -43,7 +44,7 @@ export async function show(root, { id, query, life }) {
   time.setSpan(plan.nFrames, plan.fps);
   onFrame(startFrame ?? 0);
   if (startFrame !== null) shot.seek(startFrame);
-  else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) shot.play();
+  else if (!isCalm()) shot.play();
   const facts = factsBox();
   facts.update(plan);
   root.append(

@@ -46,9 +46,9 @@ export async function show(root, { id, query, life }) {
   const placed = () => placedOf(valueOf);
   const n = () => valueOf("count") ?? planned.plan?.nIndividuals ?? 20;
   const length_s = () => (valueOf("frames") ?? 400) / film.fps;
-  const query_of = () => writeQuery(settings.now.value);
-  const address = () => `/libraries/${libraryId}/studio${query_of() && `?${query_of()}`}`;
-  const tellAddress = () => replaceAddress(moment === null ? address() : `${address()}${query_of() ? "&" : "?"}t=${moment}`);
+  const queryText = () => writeQuery(settings.now.value);
+  const address = () => `/libraries/${libraryId}/studio${queryText() && `?${queryText()}`}`;
+  const tellAddress = () => replaceAddress(moment === null ? address() : `${address()}${queryText() ? "&" : "?"}t=${moment}`);
 
   const time = timeline({ life, seek: (frame) => view.seek(frame), toggle: () => view.toggle(), onScrub: (time_s) => { moment = time_s.toFixed(2); tellAddress(); } });
   const view = stage({ libraryId, size: film.size, life, tool, startFrame: moment === null ? null : Math.round(Number(moment) * film.fps) || 0,
@@ -75,7 +75,7 @@ export async function show(root, { id, query, life }) {
   setTitle(say("studio.title", { film: filmName(library) }));
   root.append(
     element("header.place-head", {}, element("div.studio-title", {}, element("h1", { tabIndex: -1 }, say("studio.title", { film: filmName(library) })), element("a", { href: `/libraries/${libraryId}` }, say("studio.desk"))),
-      element("p.actions", {}, animals(libraries, libraryId, query_of), again, tools.acts)),
+      element("p.actions", {}, animals(libraries, libraryId, queryText), again, tools.acts)),
     unknown.length > 0 && element("p.advice-line", {}, say("studio.unknown", { names: unknown.join(", ") })) || "",
     element("div.studio", {},
       place,

@@ -55,7 +55,7 @@ export function strips(plan, { seek }) {
   const rows = all.map((series) => row(series, { last, seek }));
   const table = element("table");
   const details = element("details", { ontoggle: () => { if (details.open && !table.childElementCount) table.append(...tableOf(plan, all)); } },
-    element("summary", {}, say("timeline.table")), element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("reel.strips") }, table));
+    element("summary", {}, say("timeline.table")), element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("reel.strips") }, table));
   return {
     node: element("section.strips", { "aria-label": say("reel.strips") }, ...rows.map((one) => one.node), details),
     setFrame(frame) { for (const one of rows) one.setFrame(frame); },

@@ -38,7 +38,7 @@ export function truthLayer({ flock, plan, on, size, life, onChange, onProblem })
   const body = element("tbody");
   const heads = ["id", "x_px", "y_px", "visibility"].map((name) => element("th", { scope: "col" }, say(`reel.truth.${name}`)));
   const table = element("details.truth-table", { hidden: true, ontoggle: () => { if (table.open) load(); fill(); } }, element("summary", {}, say("reel.truth.table")),
-    element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("reel.truth.table") }, element("table", {}, element("thead", {}, element("tr", {}, ...heads)), body)));
+    element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("reel.truth.table") }, element("table", {}, element("thead", {}, element("tr", {}, ...heads)), body)));
   const inputs = PARTS.map((name) => element("input", { type: "checkbox", value: name, checked: on.includes(name), onchange: change }));
   const choices = element("fieldset.choices", {}, element("legend.unseen", {}, say("reel.truth")), ...inputs.map((input) => element("label.choice", {}, input, element("span", {}, say(`reel.truth.${input.value}`)))));
 

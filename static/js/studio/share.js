@@ -1,12 +1,10 @@
 // The same flock elsewhere: as a link, with curl, on the command line, in Python.
 // @ts-check
+import { isSignedIn } from "../app/api.js";
 import { element } from "../app/element.js";
 import { say } from "../app/words.js";
 import { analysisDefaults } from "./schema.js";
 import { waysOf } from "./ways.js";
-
-/** Key of local storage that records a session: the service asks for a token. */
-const SIGNED_IN = "flockreel-signed-in";
 
 /** @param {import("./ways.js").Library} library */
 export function share(library) {
@@ -26,7 +24,7 @@ export function share(library) {
   /** @param {import("./settings.js").Settings} settings @param {string} link */
   function update(settings, link) {
     shown = { settings, link };
-    const ways = /** @type {Record<string, string>} */ (waysOf(library, settings, { link, origin: location.origin, needsToken: localStorage.getItem(SIGNED_IN) !== null, defaults }));
+    const ways = /** @type {Record<string, string>} */ (waysOf(library, settings, { link, origin: location.origin, needsToken: isSignedIn(), defaults }));
     for (const { name, text } of rows) text.textContent = ways[name];
   }
   return { node, update, button: copyButton(say("share.copy_link"), rows[0].text, () => { node.open = true; }) };
