@@ -49,6 +49,11 @@ def slider(page, name):
     return page.locator(f'[data-name="{name}"] input[type=range]')
 
 
+def flee(page, what):
+    """The choice of what the animals flee from: nothing, hunter or path."""
+    return page.locator("#flee").get_by_role("radio", name=say(page, f"flee.{what}"), exact=True)
+
+
 def expect_animals(page, n):
     expect(flock_canvas(page)).to_have_accessible_name(said(page, "living.n", n=n), timeout=PLAN_MS)
     expect(page.locator(".studio-stage")).to_have_attribute("aria-busy", "false", timeout=PLAN_MS)
@@ -120,7 +125,6 @@ def test_a_link_opened_elsewhere_gives_the_same_settings_and_the_same_flock(stud
     page, previews = studio
     page.get_by_role("radio", name="Swarm").check()
     number(page, "count").fill("7")
-    page.get_by_text("How it looks").click()
     page.get_by_role("radio", name="Transparent").check()
     page.get_by_text("How they move").click()
     slider(page, "rules.wander").fill("1.5")
@@ -129,8 +133,8 @@ def test_a_link_opened_elsewhere_gives_the_same_settings_and_the_same_flock(stud
     other, previews_there = opened(context.new_page(), page.url)
     expect_animals(other, 7)
     assert settings(other) == settings(page)
-    expect(other.locator("#group-look > summary")).to_contain_text("changed")
-    other.get_by_text("How it looks").click()
+    expect(other.locator("#group-move > summary")).to_contain_text("changed")
+    other.get_by_text("How they move").click()
     expect(number(other, "rules.wander")).to_have_value("1.5")
     expect(other.get_by_role("radio", name="Transparent")).to_be_checked()
     expect(other.get_by_role("radio", name="Swarm")).to_be_checked()
@@ -168,9 +172,10 @@ def test_an_obstacle_drawn_on_the_picture_is_not_entered(studio, filled_service)
 def test_a_drawn_path_becomes_a_predator_for_the_whole_length(studio, filled_service):
     page, previews = studio
     expect_animals(page, 6)
-    page.get_by_role("button", name="Flee").click()
+    flee(page, "path").check()
     drag(page, [(0.1, 0.2), (0.4, 0.8), (0.6, 0.2), (0.9, 0.7)])
-    expect(page.locator("#flee")).to_have_value("path")
+    expect(page.locator(".thing-predator")).to_have_count(1)
+    expect(flee(page, "path")).to_be_checked()
     expect_animals(page, 6)
     path = bodies(previews)[-1]["predator"]["path"]
     assert 4 <= len(path) <= 30
@@ -185,7 +190,6 @@ def test_things_are_placed_moved_and_removed_by_keys(studio):
     page, previews = studio
     expect_animals(page, 6)
     page.keyboard.press("t")
-    page.keyboard.press("ArrowRight")
     page.keyboard.press("Enter")
     goal = page.locator(".thing-goal")
     expect(goal).to_be_focused()
@@ -203,9 +207,11 @@ def test_undo_and_redo_go_through_the_settings(studio):
     expect_animals(page, 6)
     number(page, "count").fill("12")
     expect_animals(page, 12)
-    page.locator("#flee").select_option("hunter")
+    flee(page, "hunter").check()
+    assert settings(page)["predator"] == "{}"
     page.keyboard.press("Control+z")
     assert "predator" not in settings(page)
+    expect(flee(page, "nothing")).to_be_checked()
     page.keyboard.press("Control+z")
     expect_animals(page, 6)
     assert settings(page)["count"] == "6"
@@ -256,8 +262,7 @@ def test_a_link_opened_by_two_visitors_makes_the_same_bytes(page, visitor, fille
 
 def test_transparent_flocks_that_flee_are_told_as_commands_and_have_alpha(page, filled_service):
     opened(page, f"{filled_service}/studio?count=2&frames=24")
-    page.locator("#flee").select_option("hunter")
-    page.get_by_text(say(page, "group.look")).click()
+    flee(page, "hunter").check()
     page.get_by_role("radio", name=say(page, "set.background.transparent")).check()
     page.get_by_text(say(page, "share.title")).click()
     command = page.locator("#group-share pre").nth(2)
@@ -300,7 +305,8 @@ def test_a_link_that_the_service_refuses_can_be_mended(page, filled_service):
 def test_chasing_with_the_pointer_becomes_a_planned_predator(studio):
     page, previews = studio
     expect_animals(page, 6)
-    page.get_by_role("button", name="Chase").click()
+    flee(page, "path").check()
+    page.get_by_role("button", name=say(page, "tool.chase")).click()
     box = page.locator(".studio-stage canvas").bounding_box()
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)

@@ -47,7 +47,7 @@ def test_back_and_forward_go_through_places_with_their_titles(page, filled_servi
     arrive(f"{name} · flockreel")
     page.get_by_role("main").get_by_role("link", name=say(page, "film.desk")).click()
     arrive(f"{say(page, 'desk.title', film=name)} · flockreel")
-    page.get_by_role("link", name=say(page, "desk.studio")).click()
+    page.get_by_role("link", name=say(page, "film.studio")).click()
     arrive(f"{say(page, 'studio.title', film=name)} · flockreel")
     menu.get_by_role("link", name=say(page, "nav.flocks")).click()
     arrive(f"{say(page, 'reels.title')} · flockreel")
@@ -95,7 +95,7 @@ def test_reload_during_an_analysis_shows_the_same_job_and_its_result(page, fille
     assert len(analyses(filled_service)) == n_analyses
     page.reload()
     expect_swimming(page, LOAD_MS)
-    expect(page.get_by_text(say(page, "film.swims"))).to_be_visible()
+    expect(page.get_by_text(say(page, "film.flock"))).to_be_visible()
 
 
 def test_reload_during_rendering_shows_the_job_and_then_the_film(page, filled_service):

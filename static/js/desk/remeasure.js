@@ -9,6 +9,7 @@ import { count, say } from "../app/words.js";
 import { mendsOf } from "../parts/mend.js";
 import { problemBox, showProblem } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
+import { analysisDefaults } from "../studio/schema.js";
 import { choice, part, rulerFields, slide } from "./remeasure-fields.js";
 import { changedParams, sizeFromRuler } from "./remeasure-params.js";
 import { createPicture } from "./remeasure-picture.js";
@@ -25,8 +26,8 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   player.pause();
   const closing = new AbortController();
   const life = closing.signal;
-  const defaults = await defaultParams(desk.life);
-  if (document.querySelector("dialog.remeasure")) return;
+  const defaults = await analysisDefaults();
+  if (desk.life.aborted || document.querySelector("dialog.remeasure")) return;
   const former = { ...defaults, ...library.params };
   const draft = signal({ ...former, ...params, ignore: params.ignore ?? former.ignore ?? [] });
   const tool = signal(/** @type {any} */ (TOOLS.includes(first) ? first : "animal"));
@@ -87,12 +88,6 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   desk.life.addEventListener("abort", () => dialog.close());
   dialog.showModal();
   if (first === "part") form.elements.from_s.focus();
-}
-
-/** Returns the defaults of all parameters of an analysis. @param {AbortSignal} life @returns {Promise<Record<string, any>>} */
-async function defaultParams(life) {
-  const { components } = await get("/openapi.json", life);
-  return Object.fromEntries(Object.entries(components.schemas.AnalysisParams.properties).map(([name, property]) => [name, /** @type {any} */ (property).default ?? null]));
 }
 
 /** Shows an analysis while it runs, and its numbers beside the former ones. @param {import("./instrument.js").Instrument} desk */

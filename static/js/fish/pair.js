@@ -64,7 +64,7 @@ export function createPair({ library, id, fish, startFrame, life, onRest }) {
   const left = element("div.stage.film-stage", { "data-look": "film", onclick: toggle }, player.node, wireframe?.canvas, note);
   left.style.aspectRatio = size.join(" / ");
   const shows = element("input", { type: "checkbox", checked: true, onchange: () => { if (wireframe) wireframe.canvas.hidden = !shows.checked; } });
-  startKeys(life, { move: (by) => seek(frame + by), go: seek, last: n - 1, toggle, orbit: space?.orbit });
+  if (space) startKeys(life, space.orbit);
   const node = element("div.fish-pair", {},
     element("section.fish-side", { "aria-label": say("fish.left") }, element("h2", {}, say("fish.left")), left, wireframe ? element("div.stage-controls", {}, element("label.choice", {}, shows, element("span", {}, say("fish.wireframe")))) : null),
     element("section.fish-side", { "aria-label": say("fish.right") }, element("h2", {}, say("fish.right")), (space ?? flat)?.node, (space ?? flat)?.controls),

@@ -8,25 +8,23 @@ import { choiceOf } from "../studio/control.js";
 import { deleted, deleteLater } from "../parts/undo.js";
 import { savedName } from "./settings.js";
 
-/** Pages of the list that are searched for the fish of a film. */
-const MOST_PAGES = 10;
 /** Time in which the browser begins to save a file, ms. */
 const KEPT_MS = 60_000;
 
 /** Returns the virtual fish of a library, newest first. @param {string} libraryId @param {AbortSignal} life */
 export async function fishOf(libraryId, life) {
   const found = [];
-  let address = /** @type {string | null} */ ("/v1/fish?limit=200");
-  for (let page = 0; address && page < MOST_PAGES; page++) {
+  let address = /** @type {string | null} */ (`/v1/fish?library_id=${encodeURIComponent(libraryId)}&limit=200`);
+  while (address) {
     const { items, next } = await list(address, life);
-    found.push(...items.filter((one) => one.library_id === libraryId && !deleted.value.has(one.id)));
+    found.push(...items.filter((one) => !deleted.value.has(one.id)));
     address = next;
   }
   return found;
 }
 
 /**
- * Saves a file under the page's name: the one that the service tells has the id instead of the film.
+ * Saves a file under a name that tells this fish from others of its film. The service's name has only the film.
  * @param {MouseEvent} event @param {string} href @param {string} download
  */
 async function save(event, href, download) {

@@ -51,16 +51,14 @@ export function deleteLater({ id, path, name }) {
   async function finish() {
     if (!waiting.delete(path)) return;
     try {
-      await remove(path);
+      await remove(path).catch((problem) => { if (problem.status !== 404) throw problem; });
       forget(path);
       close();
     } catch (problem) {
-      if (/** @type {any} */ (problem).status === 404) return close();
       mark(id, false);
       text.textContent = say("undo.failed", { name, reason: /** @type {any} */ (problem).message });
       button.replaceWith(element("button", { type: "button", onclick: close }, say("dismiss")));
     }
-    return undefined;
   }
   function close() {
     const hadFocus = note.contains(document.activeElement);
@@ -76,4 +74,6 @@ function deleteWaiting() {
     fetch(path, { method: "DELETE", keepalive: true }).catch(() => {});
   }
   waiting.clear();
+  // A browser may show the page again as it was.
+  notes?.replaceChildren();
 }
