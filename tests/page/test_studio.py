@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 
 from service import post
-from steps import fetch, flock_canvas, get, make_film_in_studio, said, say, until
+from steps import LONG_MS, fetch, flock_canvas, get, heading, make_film_in_studio, open_tray, said, say, until
 
 PLAN_MS = 60_000
 
@@ -155,7 +155,7 @@ def nearest(flock, point):
 def test_an_obstacle_drawn_on_the_picture_is_not_entered(studio, filled_service):
     page, previews = studio
     expect_animals(page, 6)
-    page.get_by_role("button", name="Round").click()
+    page.get_by_role("button", name=say(page, "tool.circle"), exact=True).click()
     width, height = drag(page, [(0.5, 0.5), (0.6, 0.5)])
     expect(page.locator(".thing-circle")).to_have_count(1)
     expect_animals(page, 6)
@@ -278,6 +278,66 @@ def test_transparent_flocks_that_flee_are_told_as_commands_and_have_alpha(page, 
     clear, solid = page.evaluate(ALPHA, f"/v1/flocks/{flock}/video.webm")
     assert clear > 0.5
     assert solid > 0.001
+
+
+def test_backgrounds_are_in_sight_without_opening_a_group(studio):
+    page, _ = studio
+    for one in ("plate", "transparent", "color"):
+        expect(page.get_by_role("radio", name=say(page, f"set.background.{one}"), exact=True)).to_be_visible()
+    assert page.locator(".studio-panel details[open]").count() == 0
+
+
+def test_flight_is_chosen_in_one_place(studio):
+    page, _ = studio
+    expect(page.locator("#flee").get_by_role("radio")).to_have_count(3)
+    tools = page.get_by_role("toolbar", name=say(page, "tool.label"))
+    for name in ("predator", "chase"):
+        expect(tools.get_by_role("button", name=say(page, f"tool.{name}"))).to_have_count(0)
+        expect(page.locator("#flee").get_by_role("button", name=say(page, f"tool.{name}"))).to_be_hidden()
+    flee(page, "path").check()
+    expect(page.locator("#flee").get_by_role("button", name=say(page, "tool.predator"))).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("Escape")
+    expect(flee(page, "nothing")).to_be_checked()
+    flee(page, "hunter").check()
+    expect(page.locator(".hunter")).to_be_visible(timeout=PLAN_MS)
+
+
+CLIPBOARD = "navigator.clipboard.readText()"
+
+
+def test_one_click_copies_a_link_to_the_finished_film(visitor, filled_service):
+    page = visitor(permissions=["clipboard-read", "clipboard-write"])
+    opened(page, f"{filled_service}/studio?count=2&frames=24&seed=3&render.background=transparent&render.formats=[%22webm%22]")
+    page.get_by_role("button", name=say(page, "make.film")).click()
+    panel = page.locator(".studio-panel")
+    panel.get_by_role("button", name=say(page, "link.copy")).click(timeout=LONG_MS)
+    expect(panel.get_by_role("status").filter(has_text=say(page, "link.copied"))).to_be_visible()
+    link = page.evaluate(CLIPBOARD)
+    with page.expect_download() as download:
+        panel.get_by_role("link", name=say(page, "job.download")).click()
+    assert download.value.suggested_filename.endswith(".webm")
+
+    page.evaluate("navigator.clipboard.writeText('')")
+    tray = open_tray(page)
+    expect(tray.get_by_role("link", name=say(page, "job.download")).first).to_be_visible()
+    tray.get_by_role("button", name=say(page, "link.copy")).first.click()
+    until(page, lambda: page.evaluate(CLIPBOARD).startswith(f"{filled_service}/s/"))
+
+    friend = visitor()
+    friend.goto(link)
+    expect(heading(friend)).to_have_text(say(friend, "shared.title", n=2))
+    clear = friend.get_by_role("link", name=say(friend, "shared.save_clear"))
+    assert fetch(filled_service + clear.get_attribute("href"))[:4] == b"\x1aE\xdf\xa3"
+
+
+def test_a_link_is_copied_where_the_browser_has_no_clipboard(page, filled_service):
+    page.add_init_script("Object.defineProperty(navigator, 'clipboard', { value: undefined });")
+    flock = get(f"{filled_service}/v1/flocks")["items"][0]
+    page.goto(f"{filled_service}/flocks/{flock['id']}")
+    copy = page.get_by_role("button", name=say(page, "link.copy"))
+    copy.click(timeout=PLAN_MS)
+    expect(page.get_by_role("status").filter(has_text=say(page, "link.copied"))).to_be_visible()
+    expect(page.get_by_role("button", name=say(page, "share.copied"))).to_be_focused()
 
 
 # The shares of clear and of solid pixels in the middle of a film.

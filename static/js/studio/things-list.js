@@ -41,7 +41,9 @@ export function thingsList({ node, life, placed, change, layer, tool }) {
     const isPath = PATH_TOOLS.includes(tool.value) || Boolean(predator?.path?.length);
     const value = isPath ? "path" : predator ? "hunter" : "nothing";
     for (const { input } of choices) input.checked = input.value === value;
+    const hadFocus = !isPath && tools.contains(document.activeElement);
     tools.hidden = !isPath;
+    if (hadFocus) choices.find(({ input }) => input.checked)?.input.focus();
     help.textContent = say(`flee.${value}.help`);
     const things = thingsOf(placed());
     const keys = things.map(titleOf).join();
