@@ -107,6 +107,7 @@ async function enliven(stage, { libraryId, flock }, life) {
   const planning = flock ? planOf(flock.id, life) : preview(libraryId, FIRST, life);
   planning.catch(() => {});
   const library = await thing("libraries", libraryId);
+  life.throwIfAborted();
   if (!stage.classList.contains("alive")) {
     setBack(stage, `/v1/libraries/${libraryId}/poster.jpg`);
     stage.querySelector(".hero-wait, .hero-note")?.remove();

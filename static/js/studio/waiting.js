@@ -27,11 +27,12 @@ export function underWay({ life, isMeant = () => true, onMeasured }) {
   jobs.watch((all) => {
     const meant = all.filter((job) => KINDS.includes(job.kind) && isMeant(job));
     for (const job of meant) if (isUnderWay(job)) seen.add(job.id);
-    const done = meant.filter((job) => job.state === "done" && seen.delete(job.id) && job.kind === "analysis");
+    const done = meant.filter((job) => job.state === "done" && seen.has(job.id));
+    for (const { id } of done) seen.delete(id);
     const shown = meant.filter((job) => seen.has(job.id)).reverse();
     reconcile(cards, shown.map((job) => ({ key: job.id, draw: jobCard, of: job })));
     node.hidden = shown.length === 0;
-    for (const job of done) onMeasured(resultOf(job));
+    for (const job of done) if (job.kind === "analysis") onMeasured(resultOf(job));
   }, life);
   return node;
 }
