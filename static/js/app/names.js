@@ -32,7 +32,7 @@ export function filmName(one) {
   return (one?.name || "").replace(/\.[a-z0-9]{2,5}$/i, "").replaceAll("_", " ").trim() || say("film.unnamed");
 }
 
-/** Lists under way, by kind. @type {Map<string, Promise<{next: string | null}>>} */
+/** Lists of the last moment, by kind. @type {Map<string, Promise<{items: any[], next: string | null}>>} */
 const listing = new Map();
 
 /**
@@ -45,8 +45,10 @@ async function existing(kind, id) {
   if (!known.has(path)) {
     const asked = listing.get(kind) ?? list(`/v1/${kind}?limit=100`).then((page) => { remember(kind, page.items); return page; });
     listing.set(kind, asked);
-    const { next } = await asked.finally(() => setTimeout(() => listing.delete(kind), 1000));
-    if (!known.has(path) && !next) return null;
+    const { items: [newest], next } = await asked.finally(() => setTimeout(() => listing.delete(kind), 1000));
+    // Ids grow with time: the list does not know what is younger.
+    const isYounger = !newest || id > newest.id;
+    if (!known.has(path) && !next && !isYounger) return null;
   }
   return thing(kind, id).catch((problem) => {
     if (problem.status === 404) return null;
