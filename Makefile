@@ -73,6 +73,7 @@ stress-test: target/vendor ## lose the power, let steps fail, send too much: mak
 	$(CARGO) test --locked --workspace --no-run
 	@scripts/system-packages.sh test contract-test
 	python3 -B tests/stress/power_loss.py $(DEBUG)
+	python3 -B tests/stress/time_jumps.py $(DEBUG)
 	python3 -B tests/stress/overload.py $(DEBUG)
 	python3 -B tests/stress/failure_steps.py $(DEBUG) $(if $(filter all,$(CASES)),,--cases $(or $(CASES),16))
 

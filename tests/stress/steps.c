@@ -1,10 +1,11 @@
 /* Stands between the service and the C library (LD_PRELOAD) and sees every call that changes files below
- * CRASH_ROOT. It does one of two things.
+ * CRASH_ROOT. It does what these variables ask for.
  *
  * CRASH_STEP=N, CRASH_ACTION=...: the Nth of these calls of the process is a failure step.
  *     kill-before, kill-after   the process dies before or after the call
  *     EIO, ENOSPC               the call, and all later ones within FAILING_MS, fail with this error
  *     delay                     the call takes DELAY_MS longer
+ * CRASH_CLOCK=FILE: the clock of the process is wrong by the seconds in the file, a 64-bit integer.
  * CRASH_LOG=FILE: every sync is recorded with what it made durable, and every write to a database file.
  *
  * Without a step the calls are counted. CRASH_COUNT=FILE receives the number when the process ends. */
@@ -20,6 +21,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/uio.h>
 #include <time.h>
@@ -34,6 +36,17 @@ static long wanted_step, n_steps;
 static int log_fd = -1;
 static const char *action;
 static int64_t failing_until_ms;
+static volatile int64_t *clock_error_s;
+
+typedef int clock_call(clockid_t, struct timespec *);
+
+int clock_gettime(clockid_t clock, struct timespec *time) {
+    static clock_call *real;
+    if (real == NULL) real = (clock_call *)dlsym(RTLD_NEXT, "clock_gettime");
+    int result = real(clock, time);
+    if (clock == CLOCK_REALTIME && clock_error_s != NULL) time->tv_sec += *clock_error_s;
+    return result;
+}
 
 static int64_t now_ns(clockid_t clock) {
     struct timespec now;
@@ -44,6 +57,13 @@ static int64_t now_ns(clockid_t clock) {
 __attribute__((constructor)) static void begin(void) {
     const char *folder = getenv("CRASH_ROOT"), *step = getenv("CRASH_STEP"), *log = getenv("CRASH_LOG");
     action = getenv("CRASH_ACTION");
+    const char *clock = getenv("CRASH_CLOCK");
+    int fd = clock == NULL ? -1 : open(clock, O_RDONLY | O_CLOEXEC);
+    if (fd >= 0) {
+        void *error = mmap(NULL, sizeof *clock_error_s, PROT_READ, MAP_SHARED, fd, 0);
+        if (error != MAP_FAILED) clock_error_s = error;
+        close(fd);
+    }
     if (folder == NULL || realpath(folder, root) == NULL) root[0] = 0;
     if (step != NULL) wanted_step = atol(step);
     if (log != NULL) log_fd = open(log, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);

@@ -1,6 +1,7 @@
 //! Rescue: jobs whose worker has stopped sending heartbeats return to the queue or end
 //! (docs/explanation/promises.md, "No job is lost" and "Poison jobs"). The lease decides, never the age of
-//! the job: a job may run for hours while its worker sends heartbeats.
+//! the job: a job may run for hours while its worker sends heartbeats. The caller decides which leases have ended,
+//! because clocks may jump.
 //!
 //! A crash of a process is blamed on a job only if no other job ran in it. The leases of one process end some seconds
 //! apart, so the first rescue marks the jobs beside it.
@@ -16,10 +17,22 @@ use flockreel_core::ids::JobId;
 /// Number of crashes of a process that a job may be the only one in. Free choice.
 const MAX_LONE_CRASHES: i64 = 3;
 
-/// A job whose lease has ended.
+/// The lease of a running job. Every heartbeat changes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, sqlx::FromRow)]
+pub struct HeldLease {
+    /// Id of the job.
+    pub job_id: Uuid,
+    /// Number of the claim.
+    pub fence: i64,
+    /// End of the lease by the clock of its worker, milliseconds since 1970.
+    pub until_ms: i64,
+}
+
+/// A running job.
 #[derive(sqlx::FromRow)]
-struct Expired {
-    id: Uuid,
+struct Running {
+    #[sqlx(flatten)]
+    lease: HeldLease,
     /// The process that held the lease.
     worker: Uuid,
     /// Number of running jobs of that process, with this one.
@@ -31,42 +44,53 @@ struct Expired {
 }
 
 impl Store {
-    /// Rescues every job whose lease expired before `now_ms`. The job is cancelled if that was requested, fails as
-    /// `crashed_worker` if it was alone in three processes that stopped, and otherwise returns to the queue. A stop of
-    /// the calling process `process`, which is alive, is no crash. Returns the new states.
+    /// Returns the leases of all running jobs.
+    pub async fn held_leases(&self) -> Result<Vec<HeldLease>, Error> {
+        let sql = "select id as job_id, fence, lease_until_ms as until_ms from jobs where state = 'running'";
+        Ok(sql::query(sql).fetch_all(&self.reader).await?)
+    }
+
+    /// Rescues the jobs whose leases have `ended`, unless a heartbeat has changed them since. A job is cancelled if
+    /// that was requested, fails as `crashed_worker` if it was alone in three processes that stopped, and otherwise
+    /// returns to the queue. A stop of the calling process `process`, which is alive, is no crash. Returns the new
+    /// states.
     pub async fn rescue(
         &self,
         process: Uuid,
+        ended: &[HeldLease],
         now_ms: i64,
     ) -> Result<Vec<(JobId, JobState)>, Error> {
-        let rescue = || self.rescue_leases_before(now_ms, process, now_ms);
+        if ended.is_empty() {
+            return Ok(Vec::new());
+        }
+        let rescue = || self.rescue_where(|lease| ended.contains(lease), process, now_ms);
         self.reserve.lend(rescue).await
     }
 
     /// Rescues all running jobs, at the start of a process. Call it only if [`Store::is_alone`]: the workers
     /// that hold their leases have then ended.
     pub async fn rescue_all(&self, now_ms: i64) -> Result<Vec<(JobId, JobState)>, Error> {
-        let rescue = || self.rescue_leases_before(i64::MAX, Uuid::nil(), now_ms);
+        let rescue = || self.rescue_where(|_| true, Uuid::nil(), now_ms);
         self.reserve.lend(rescue).await
     }
 
-    async fn rescue_leases_before(
+    async fn rescue_where(
         &self,
-        lease_end_ms: i64,
+        has_ended: impl Fn(&HeldLease) -> bool,
         process: Uuid,
         now_ms: i64,
     ) -> Result<Vec<(JobId, JobState)>, Error> {
         let mut transaction = self.writer.begin().await?;
-        let expired: Vec<Expired> = sql::query(
-            "select id, worker, beside_crash, lone_crashes, cancel_requested, \
+        let running: Vec<Running> = sql::query(
+            "select id as job_id, fence, lease_until_ms as until_ms, worker, beside_crash, lone_crashes, cancel_requested, \
              (select count(*) from jobs o where o.state = 'running' and o.worker = j.worker) as n_of_process \
-             from jobs j where state = 'running' and lease_until_ms < $1 order by id for update skip locked",
+             from jobs j where state = 'running' order by id for update skip locked",
         )
-        .bind(lease_end_ms)
         .fetch_all(&mut transaction)
         .await?;
-        let mut rescued = Vec::with_capacity(expired.len());
-        for job in &expired {
+        let expired = running.iter().filter(|job| has_ended(&job.lease));
+        let mut rescued = Vec::new();
+        for job in expired.clone() {
             let was_alone = job.n_of_process == 1 && !job.beside_crash;
             let is_blamed = was_alone && job.worker != process;
             let lone_crashes = job.lone_crashes + i64::from(is_blamed);
@@ -77,10 +101,10 @@ impl Store {
             } else {
                 JobState::Queued
             };
-            settle(&mut transaction, job.id, lone_crashes, state, now_ms).await?;
-            rescued.push((JobId(job.id), state));
+            settle(&mut transaction, job.lease.job_id, lone_crashes, state, now_ms).await?;
+            rescued.push((JobId(job.lease.job_id), state));
         }
-        for job in &expired {
+        for job in expired {
             let sql = "update jobs set beside_crash = true where state = 'running' and worker = $1";
             let mark = sql::query(sql).bind(job.worker);
             mark.execute(&mut transaction).await?;

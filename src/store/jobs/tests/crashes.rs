@@ -64,7 +64,7 @@ async fn job_whose_neighbor_was_rescued_before_is_not_blamed() {
     for _ in 0..4 {
         let jobs = queue.claim_together(2).await;
         for (job, now_ms) in jobs.iter().zip(LEASE_MS + 1..) {
-            let rescued = queue.store.rescue(ALIVE, now_ms).await.unwrap();
+            let rescued = queue.rescue(now_ms).await;
             assert_eq!(rescued, [(*job, JobState::Queued)]);
         }
     }
@@ -77,7 +77,7 @@ async fn jobs_of_two_processes_are_not_beside_each_other() {
     for _ in 0..3 {
         queue.claim(0).await.unwrap();
         queue.claim(0).await.unwrap();
-        queue.store.rescue(ALIVE, LEASE_MS + 1).await.unwrap();
+        queue.rescue(LEASE_MS + 1).await;
     }
     for job in jobs {
         assert_eq!(queue.state(job).await, JobState::Failed);
@@ -90,7 +90,7 @@ async fn lost_lease_of_the_living_process_is_no_crash() {
     let job = queue.enqueue(None).await;
     for _ in 0..4 {
         queue.store.claim(ALIVE, 0, LEASE_MS).await.unwrap();
-        queue.store.rescue(ALIVE, LEASE_MS + 1).await.unwrap();
+        queue.rescue(LEASE_MS + 1).await;
         assert_eq!(queue.state(job).await, JobState::Queued);
     }
 }

@@ -65,6 +65,13 @@ impl Queue {
         self.store.claim(worker, now_ms, LEASE_MS).await.unwrap()
     }
 
+    /// Rescues the jobs whose leases ended before `now_ms`.
+    async fn rescue(&self, now_ms: i64) -> Vec<(JobId, JobState)> {
+        let mut ended = self.store.held_leases().await.unwrap();
+        ended.retain(|lease| lease.until_ms < now_ms);
+        self.store.rescue(ALIVE, &ended, now_ms).await.unwrap()
+    }
+
     async fn state(&self, job: JobId) -> JobState {
         self.row(job).await.state
     }
@@ -147,8 +154,8 @@ async fn heartbeat_prevents_rescue() {
     let lease = queue.claim(0).await.unwrap();
     let beat = queue.store.heartbeat(&lease, 40_000, "tracking", 0.5).await;
     assert_eq!(beat.unwrap(), Beat::Held);
-    assert_eq!(queue.store.rescue(ALIVE, 39_000).await.unwrap(), []);
-    let rescued = queue.store.rescue(ALIVE, 40_001).await.unwrap();
+    assert_eq!(queue.rescue(39_000).await, []);
+    let rescued = queue.rescue(40_001).await;
     assert_eq!(rescued, [(lease.job_id, JobState::Queued)]);
 }
 
@@ -173,7 +180,7 @@ async fn worker_with_an_old_fence_changes_nothing() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     let stale = queue.claim(0).await.unwrap();
-    queue.store.rescue(ALIVE, LEASE_MS + 1).await.unwrap();
+    queue.rescue(LEASE_MS + 1).await;
     let fresh = queue.claim(LEASE_MS + 1).await.unwrap();
 
     assert_eq!(queue.finish(&stale).await, Change::Lost);

@@ -2,12 +2,15 @@
 //! data, and stops the workers at the end (docs/explanation/promises.md, "No job is lost", "Graceful stop"
 //! and "No orphans").
 
+mod lease_watch;
+
 use std::convert::Infallible;
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
 
+use self::lease_watch::LeaseWatch;
 use super::worker::{Step, Worker};
 use super::{Context, clock};
 use crate::store::jobs::JobState;
@@ -82,8 +85,9 @@ async fn work(worker: Worker, context: Context) {
 }
 
 async fn rescue(context: Context) {
+    let mut watch = LeaseWatch::default();
     while !context.draining.is_cancelled() {
-        match rescue_expired(&context).await {
+        match rescue_ended(&context, &mut watch).await {
             Ok(rescued) if rescued.is_empty() => {}
             Ok(_) => context.wake.notify_one(),
             Err(error) => tracing::error!(%error, "the search for ended leases failed"),
@@ -95,9 +99,14 @@ async fn rescue(context: Context) {
     }
 }
 
-async fn rescue_expired(context: &Context) -> Result<Vec<(JobId, JobState)>, store::Error> {
+async fn rescue_ended(
+    context: &Context,
+    watch: &mut LeaseWatch,
+) -> Result<Vec<(JobId, JobState)>, store::Error> {
+    let held = context.store.held_leases().await?;
+    let ended = watch.ended(held, context.lease, Instant::now());
     let now_ms = context.now_ms().await?;
-    context.store.rescue(context.process, now_ms).await
+    context.store.rescue(context.process, &ended, now_ms).await
 }
 
 /// Wakes a worker when any process has queued a job.
@@ -143,14 +152,11 @@ async fn sweep_expired(store: &Store) -> Result<(), store::Error> {
 }
 
 /// Repairs the state after a crash, before the first worker starts: leases, idempotency keys, drafts and
-/// folders. If other processes share the database, only expired leases are rescued.
+/// folders. If other processes share the database, their jobs may run, so the rescue of ended leases waits.
 pub async fn recover(context: &Context) -> Result<(), store::Error> {
-    let now_ms = context.now_ms().await?;
     if context.store.is_alone() {
-        context.store.rescue_all(now_ms).await?;
+        context.store.rescue_all(context.now_ms().await?).await?;
         context.store.interrupt_all_keys().await?;
-    } else {
-        context.store.rescue(context.process, now_ms).await?;
     }
     if context.store.serves() {
         context.store.sweep_upload_files().await?;
