@@ -75,8 +75,9 @@ export async function show(root, { query, life }) {
     more.hidden = !next;
     found.textContent = wanted() ? say("reels.found", { n: fit.length, query: search.value.trim() }) : "";
     empty.hidden = Boolean(wanted() || kept.length || next);
+    search.hidden = !wanted() && !kept.length && !next;
   };
-  /** The service cannot search, so all pages are loaded. */
+  /** The service searches the names of files, a person the names on the cards: all pages are loaded. */
   const searchAll = async () => {
     while (next && wanted() && !life.aborted) await fill(SEARCHED);
   };
