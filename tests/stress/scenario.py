@@ -5,6 +5,7 @@ client itself changes them later.
 """
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -56,7 +57,9 @@ class Service:
         bind = self.address.removeprefix("http://")
         command = [program, "serve", "--bind", bind, "--data", data, "--no-sample", "--log", "warn"]
         steps = {"LD_PRELOAD": str(library), "CRASH_ROOT": str(data), **variables} if library else {}
-        self.process = subprocess.Popen(command, env={"PATH": "/usr/local/bin:/usr/bin:/bin", **steps})
+        # Tests of the guards name the one that is disabled.
+        kept = {name: os.environ[name] for name in ("PATH", "FLOCKREEL_GUARD_OFF") if name in os.environ}
+        self.process = subprocess.Popen(command, env={**kept, **steps})
 
     def __enter__(self):
         return self

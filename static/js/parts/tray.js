@@ -64,7 +64,7 @@ export function jobCard(job) {
     name.textContent = say(`job.${job.kind}`, { film: film.name });
     thumb.hidden = !film.poster;
     if (film.poster) thumb.src = film.poster;
-    if (drawn.startsWith(seen.state)) actions.replaceChildren(...buttonsOf(seen, film));
+    if (drawn.startsWith(seen.state) && !isUnderWay(seen)) actions.replaceChildren(...buttonsOf(seen, film));
   };
   card.update = (/** @type {any} */ seen) => {
     bar.value = seen.progress ?? 0;
