@@ -62,7 +62,7 @@ use lane::Extent;
 pub struct Context {
     /// The store.
     pub store: Store,
-    /// Wakes an idle worker when a job is queued.
+    /// Wakes the idle workers when a job is queued.
     pub wake: Arc<Notify>,
     /// Cancelled when the process stops. Workers then claim no jobs, and running jobs return to the queue.
     pub draining: CancellationToken,
@@ -129,7 +129,7 @@ impl Context {
             max_queued: self.max_queued,
         };
         self.store.enqueue(&job, self.now_ms().await?).await?;
-        self.wake.notify_one();
+        self.wake.notify_waiters();
         Ok((job_id, result_id.into()))
     }
 
@@ -144,7 +144,7 @@ impl Context {
         let retry = store
             .retry(job, owners, account, self.max_queued, now_ms)
             .await?;
-        self.wake.notify_one();
+        self.wake.notify_waiters();
         Ok(retry)
     }
 

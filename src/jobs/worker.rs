@@ -19,6 +19,7 @@ use crate::store::jobs::claim::Lane;
 use crate::store::jobs::finish::Outcome;
 use crate::store::jobs::heartbeat::Beat;
 use crate::store::jobs::requeue::End;
+use crate::store::jobs::retry::may_pass;
 use crate::store::jobs::{Change, Lease};
 use flockreel_core::code::Code;
 use flockreel_core::ids::JobId;
@@ -171,19 +172,23 @@ impl Worker {
         result: Result<Outcome, Error>,
     ) -> Result<Step, store::Error> {
         let (store, job) = (&self.context.store, lease.job_id);
+        let is_draining = self.context.draining.is_cancelled();
         let result = match result {
             Ok(outcome) => finish(store, lease, &outcome).await.map_err(Error::from),
             Err(error) => Err(error),
         };
         let (change, step) = match result {
             Ok(change) => (change, Step::Done(job)),
+            // Who stops the service may stop the processes of its jobs, too.
+            Err(error)
+                if is_draining && (was_stopped(&error, listener) || may_pass(error.code())) =>
+            {
+                tracing::debug!(job.id = %job, %error, "the computation of a job ended as the service stops");
+                (store.release(lease).await?, Step::Released(job))
+            }
             Err(error) if was_stopped(&error, listener) => {
                 tracing::debug!(job.id = %job, %error, "the computation of a job ended as requested");
-                if self.context.draining.is_cancelled() {
-                    (store.release(lease).await?, Step::Released(job))
-                } else {
-                    (store.stop(lease, now_ms()).await?, Step::Cancelled(job))
-                }
+                (store.stop(lease, now_ms()).await?, Step::Cancelled(job))
             }
             Err(error) if let Some((end, n_earlier)) = bad_end(&error, lease) => {
                 tracing::warn!(job.id = %job, %error, n_earlier, "a job ended badly; it is tried again");

@@ -19,7 +19,7 @@ export default {
   "tray.title": "Jobs", "tray.all": "All jobs", "tray.idle": "Jobs", "tray.busy": "{n} running", "tray.sending": "Sending {n}", "tray.refused": "{n} not accepted", "tray.paused": "{n} interrupted",
   "tray.empty": "Nothing is running.",
   "job.analysis": "Measuring {film}", "job.flock": "Making a flock of {film}", "job.fish": "Making the virtual fish of {film}", "job.sample": "Filming a sample",
-  "job.progress": "Progress", "job.left": "About {time} left.", "job.ahead": { one: "{n} job before this one.", other: "{n} jobs before this one." }, "job.restarted": "Restarted after an interruption (attempt {n}).", "job.open": "Open", "job.download": "Download", "job.again": "Measure again", "job.film": "See the film",
+  "job.progress": "Progress", "job.left": "About {time} left.", "job.ahead": { one: "{n} job before this one.", other: "{n} jobs before this one." }, "job.restarted": "Restarted after an interruption (attempt {n}).", "job.open": "Open", "job.download": "Download", "job.again": "Measure again", "job.retry": "Try again", "job.film": "See the film",
   "upload.sending": "Sending", "upload.checking": "Checking", "upload.failed": "Not accepted", "upload.paused": "Interrupted", "upload.choose": "Choose the same file again. The upload goes on where it stopped.", "upload.of": "{sent} of {total}",
   "state.queued": "Waiting", "state.running": "Working", "state.done": "Done", "state.failed": "Failed", "state.cancelled": "Cancelled", "state.cancelling": "Stopping",
   "stage.starting": "Starting", "stage.filming": "Filming a virtual goldfish", "stage.background": "Finding the still scene", "stage.tracking": "Following the animal",

@@ -18,7 +18,7 @@ export default {
   "tray.title": "ジョブ", "tray.all": "すべてのジョブ", "tray.idle": "ジョブ", "tray.busy": "{n}件実行中", "tray.sending": "{n}件送信中", "tray.refused": "{n}件受付不可", "tray.paused": "{n}件中断",
   "tray.empty": "実行中のジョブはありません。",
   "job.analysis": "{film}の計測", "job.flock": "{film}の群れの作成", "job.fish": "{film}のバーチャルフィッシュの作成", "job.sample": "サンプル動画の作成",
-  "job.progress": "進み具合", "job.left": "残り約{time}です。", "job.ahead": "この前に{n}件のジョブがあります。", "job.restarted": "中断したため、やり直しています（{n}回目）。", "job.open": "開く", "job.download": "ダウンロード", "job.again": "再計測", "job.film": "動画を見る",
+  "job.progress": "進み具合", "job.left": "残り約{time}です。", "job.ahead": "この前に{n}件のジョブがあります。", "job.restarted": "中断したため、やり直しています（{n}回目）。", "job.open": "開く", "job.download": "ダウンロード", "job.again": "再計測", "job.retry": "もう一度試す", "job.film": "動画を見る",
   "upload.sending": "送信中", "upload.checking": "確認中", "upload.failed": "受付不可", "upload.paused": "中断", "upload.choose": "同じファイルをもう一度選ぶと、中断したところから送信を再開します。", "upload.of": "{sent} / {total}",
   "state.queued": "待機中", "state.running": "実行中", "state.done": "完了", "state.failed": "失敗", "state.cancelled": "中止", "state.cancelling": "中止処理中",
   "stage.starting": "開始中", "stage.filming": "仮想の金魚を撮影中", "stage.background": "背景を推定中", "stage.tracking": "動物を追跡中",

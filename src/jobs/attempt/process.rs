@@ -185,7 +185,8 @@ async fn follow(
         return Err(io::Error::other("an attempt has no pipes").into());
     };
     let stdin = Sender::from_owned_fd(stdin.into())?;
-    let feeding = tokio::spawn(feed(stdin, serde_json::to_string(order)?, listener.clone()));
+    let order = serde_json::to_string(order).map_err(io::Error::other)?;
+    let feeding = tokio::spawn(feed(stdin, order, listener.clone()));
     let feeding = AbortOnDropHandle::new(feeding);
     let log = tokio::spawn(relay_log(Receiver::from_owned_fd(stderr.into())?).in_current_span());
     let mut messages = pin!(read(Receiver::from_owned_fd(stdout.into())?, listener));

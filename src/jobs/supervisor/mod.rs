@@ -35,15 +35,14 @@ impl Supervisor {
     pub fn start(context: Context, n_workers: usize) -> Supervisor {
         let mut tasks = JoinSet::new();
         for idx in 0..n_workers {
-            let lane = if idx > 0 && idx + 1 == n_workers {
+            let is_for_small_jobs = idx > 0 && idx + 1 == n_workers;
+            let lane = if is_for_small_jobs {
                 Lane::Short
             } else {
                 Lane::All
             };
-            tasks.spawn(work(
-                Worker::in_lane(context.clone(), lane),
-                context.clone(),
-            ));
+            let worker = Worker::in_lane(context.clone(), lane);
+            tasks.spawn(work(worker, context.clone()));
         }
         tasks.spawn(rescue(context.clone()));
         tasks.spawn(listen(context.clone()));
@@ -66,16 +65,18 @@ impl Supervisor {
 
 async fn work(worker: Worker, context: Context) {
     while !context.draining.is_cancelled() {
+        // Created before the step, so that it also hears of a job that is queued during the step.
+        let woken = context.wake.notified();
         match worker.step().await {
             Ok(Step::Idle) => {
                 tokio::select! {
-                    () = context.wake.notified() => {}
+                    () = woken => {}
                     () = sleep(POLL_INTERVAL) => {}
                     () = context.draining.cancelled() => {}
                 }
             }
             // Other jobs may depend on the job that ended.
-            Ok(_) => context.wake.notify_one(),
+            Ok(_) => context.wake.notify_waiters(),
             Err(error) => {
                 tracing::error!(%error, "the queue returned an error to a worker");
                 sleep(POLL_INTERVAL).await;
@@ -89,7 +90,7 @@ async fn rescue(context: Context) {
     while !context.draining.is_cancelled() {
         match rescue_ended(&context, &mut watch).await {
             Ok(rescued) if rescued.is_empty() => {}
-            Ok(_) => context.wake.notify_one(),
+            Ok(_) => context.wake.notify_waiters(),
             Err(error) => tracing::error!(%error, "the search for ended leases failed"),
         }
         tokio::select! {
@@ -109,14 +110,14 @@ async fn rescue_ended(
     context.store.rescue(context.process, &ended, now_ms).await
 }
 
-/// Wakes a worker when any process has queued a job.
+/// Wakes the workers when any process has queued a job.
 async fn listen(context: Context) {
     while !context.draining.is_cancelled() {
         let heard = async {
             let mut queued = context.store.listen().await?;
             loop {
                 queued.next().await?;
-                context.wake.notify_one();
+                context.wake.notify_waiters();
             }
         };
         let lost: Result<Infallible, store::Error> = tokio::select! {

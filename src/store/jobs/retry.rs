@@ -9,16 +9,19 @@ use crate::store::{Error, Store, sql};
 use flockreel_core::code::Code;
 use flockreel_core::ids::JobId;
 
-/// Codes of failures that another attempt may avoid: because the service crashed, because the machine was busy or
-/// full, or because an operator has raised a limit.
-const RETRIABLE: [Code; 6] = [
-    Code::CrashedWorker,
-    Code::Internal,
-    Code::StorageFull,
-    Code::TimeLimit,
-    Code::MemoryLimit,
-    Code::DecoderCrashed,
-];
+/// Returns whether another attempt may avoid a failure with this code: it came from a crash or a stop, from a machine
+/// that was busy or full, or from a limit that an operator can raise.
+pub fn may_pass(code: Code) -> bool {
+    matches!(
+        code,
+        Code::CrashedWorker
+            | Code::Internal
+            | Code::StorageFull
+            | Code::TimeLimit
+            | Code::MemoryLimit
+            | Code::DecoderCrashed
+    )
+}
 
 /// Result of [`Store::retry`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,9 +67,7 @@ impl Refusal {
             _ if matches!(before, Some(JobState::Failed | JobState::Cancelled)) => {
                 Some(Refusal::NoInput)
             }
-            JobState::Failed if !code.is_some_and(|code| RETRIABLE.contains(&code)) => {
-                Some(Refusal::SameReason)
-            }
+            JobState::Failed if !code.is_some_and(may_pass) => Some(Refusal::SameReason),
             JobState::Failed | JobState::Cancelled => None,
         }
     }

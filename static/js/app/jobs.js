@@ -1,6 +1,6 @@
 // All jobs of the person, kept up to date by the event stream, and by polling while the stream is down.
 // @ts-check
-import { get, Problem, remove } from "./api.js";
+import { get, post, Problem, remove } from "./api.js";
 import { signal } from "./store.js";
 
 const POLL_MS = 1000;
@@ -123,6 +123,9 @@ export const aheadOf = (job) => jobs.value.filter((other) => isUnderWay(other) &
 
 /** @param {string} id */
 export const cancel = (id) => remove(`/v1/jobs/${id}`);
+
+/** Starts a failed or cancelled job again. @param {string} id */
+export const retry = async (id) => merge(await post(`/v1/jobs/${id}/retry`));
 
 /** Returns the id of the result of a job. @param {any} job @returns {string} */
 export const resultOf = (job) => job.links.result.split("/").at(-1);

@@ -1,7 +1,7 @@
 // The tray of jobs: what runs, how far it is, and buttons to cancel, open, mend or retry.
 // @ts-check
 import { byId, element } from "../app/element.js";
-import { addressOf, aheadOf, cancel, isUnderWay, jobs, resultOf, uploads } from "../app/jobs.js";
+import { addressOf, aheadOf, cancel, isUnderWay, jobs, resultOf, retry, uploads } from "../app/jobs.js";
 import { subjectOf } from "../app/names.js";
 import { ago, percent, say, size, stageOf } from "../app/words.js";
 import { fileButton, measure } from "./drop.js";
@@ -87,13 +87,13 @@ export function jobCard(job) {
 /** @param {any} job @param {{isGone: boolean}} [film] what the job works on, once it is known */
 function buttonsOf(job, film) {
   if (isUnderWay(job)) {
-    const stop = (/** @type {any} */ event) => { event.target.disabled = true; cancel(job.id).catch(() => { event.target.disabled = false; }); };
-    return [element("button.quiet", { type: "button", disabled: job.cancel_requested, onclick: stop }, say("cancel"))];
+    return [element("button.quiet", { type: "button", disabled: job.cancel_requested, onclick: once(() => cancel(job.id)) }, say("cancel"))];
   }
   if (!film || film.isGone) return [];
   if (job.state === "done") return job.kind === "sample" ? [] : [element("a.button.quiet", { href: addressOf(job) }, say("job.open")), ...(job.kind === "flock" ? filmButtons(resultOf(job)) : [])];
-  if (job.kind === "analysis") return [element("button.quiet", { type: "button", onclick: () => measure(job.subject.id, {}, { show: true }) }, say("job.again")), element("a.button.quiet", { href: `/films/${job.subject.id}` }, say("job.film"))];
-  return job.kind === "flock" ? [element("a.button.quiet", { href: `/libraries/${job.subject.id}/studio` }, say("reels.studio"))] : [];
+  const again = job.retriable ? [element("button.quiet", { type: "button", onclick: once(() => retry(job.id)) }, say("job.retry"))] : [];
+  if (job.kind === "analysis") return [...(again.length ? again : [element("button.quiet", { type: "button", onclick: () => measure(job.subject.id, {}, { show: true }) }, say("job.again"))]), element("a.button.quiet", { href: `/films/${job.subject.id}` }, say("job.film"))];
+  return job.kind === "flock" ? [...again, element("a.button.quiet", { href: `/libraries/${job.subject.id}/studio` }, say("reels.studio"))] : again;
 }
 
 /** Returns how many jobs come before a job that waits. @param {any} job */
@@ -101,6 +101,9 @@ function aheadText(job) {
   const n = job.state === "queued" ? aheadOf(job) : 0;
   return n ? say("job.ahead", { n }) : "";
 }
+
+/** Returns a handler of clicks that disables its button, unless the request fails. @param {() => Promise<any>} request */
+const once = (request) => (/** @type {any} */ event) => { event.target.disabled = true; request().catch(() => { event.target.disabled = false; }); };
 
 /** Returns the time left as text, estimated from the progress since the job began. @param {any} job */
 function leftText(job) {

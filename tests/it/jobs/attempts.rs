@@ -94,6 +94,17 @@ async fn job_whose_media_tool_is_killed_from_outside_is_done_by_the_next_attempt
     assert_eq!(place.n_drafts(), 0);
 }
 
+/// Queues a flock of so many individuals, frames and pixels, and returns the id of its job.
+async fn flock(server: &Server, library: &Value, size: (u32, u32, [u32; 2])) -> Value {
+    let (count, frames, size_px) = size;
+    let render = json!({"size_px": size_px});
+    let wish = json!({"library_id": library, "count": count, "frames": frames, "render": render});
+    server.accept("/v1/flocks", wish).await["job_id"].clone()
+}
+
+const HUGE: (u32, u32, [u32; 2]) = (400, 5000, [3840, 2160]);
+const SMALL: (u32, u32, [u32; 2]) = (2, 8, [320, 240]);
+
 #[tokio::test(flavor = "multi_thread")]
 async fn job_over_its_memory_limit_fails_and_leaves_the_service_as_it_was() {
     let place = Place::local();
@@ -102,19 +113,40 @@ async fn job_over_its_memory_limit_fails_and_leaves_the_service_as_it_was() {
     let ended = server.ended(&accepted["job_id"]).await;
     assert_eq!(ended["state"], "done", "{ended}");
     let before = memory_bytes(server.pid());
-    let flock = async |count: u32, frames: u32, size_px: [u32; 2]| {
-        let render = json!({"size_px": size_px});
-        let wish = json!({"library_id": accepted["library_id"], "count": count, "frames": frames, "render": render});
-        let flock = server.accept("/v1/flocks", wish).await;
-        server.ended(&flock["job_id"]).await
-    };
-    let huge = flock(400, 2000, [3840, 2160]).await;
+    let huge = flock(&server, &accepted["library_id"], HUGE).await;
+    let huge = server.ended(&huge).await;
     assert_eq!(huge["error"]["code"], "memory_limit", "{huge}");
     assert_eq!(huge["attempt"], 1);
-    let small = flock(2, 8, [320, 240]).await;
+    let small = flock(&server, &accepted["library_id"], SMALL).await;
+    let small = server.ended(&small).await;
     assert_eq!(small["state"], "done", "{small}");
     let grown = memory_bytes(server.pid()).saturating_sub(before);
     assert!(grown < 100 << 20, "{grown}");
+    assert_eq!(server.terminate(), Some(0));
+    assert_eq!(place.n_drafts(), 0);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn small_flock_is_done_while_a_huge_one_renders() {
+    let place = Place::local();
+    let server = Server::start_with(place.data(), &["--workers", "2"]);
+    let accepted = server.analyze(SWIM.clone()).await;
+    server.ended(&accepted["job_id"]).await;
+    let mut huge = Vec::new();
+    for _ in 0..2 {
+        huge.push(flock(&server, &accepted["library_id"], HUGE).await);
+    }
+    let is_running = |job: &Value| job["state"] == "running";
+    server.job_when(&huge[0], is_running).await;
+    let small = flock(&server, &accepted["library_id"], SMALL).await;
+    let small = server.ended(&small).await;
+    assert_eq!(small["state"], "done", "{small}");
+    for (job, state) in huge.iter().zip(["running", "queued"]) {
+        let path = format!("/v1/jobs/{}", job.as_str().unwrap());
+        assert_eq!(server.json(&path).await["state"], state);
+        server.delete(&path).await;
+        assert_eq!(server.ended(job).await["state"], "cancelled");
+    }
     assert_eq!(server.terminate(), Some(0));
     assert_eq!(place.n_drafts(), 0);
 }

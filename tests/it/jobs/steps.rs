@@ -105,6 +105,24 @@ async fn running_job_is_released_when_the_service_stops() {
     app.assert_sound().await;
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn attempt_that_is_ended_with_the_service_uses_no_attempt() {
+    for end in ["kill -TERM $$".to_owned(), failed("decoder_crashed", false)] {
+        let (app, job) = with_job().await;
+        let folder = tempfile::tempdir().unwrap();
+        let gate = folder.path().join("gate");
+        let worker = worker(&app, &(until_exists(&gate) + &end));
+        let step = tokio::spawn(async move { worker.step().await.unwrap() });
+        app.job_when(&json!(job), |job| job["state"] == "running")
+            .await;
+        app.context.draining.cancel();
+        std::fs::write(&gate, b"").unwrap();
+        assert_eq!(step.await.unwrap(), Step::Released(job));
+        assert_eq!(state_of(&app, job).await, (JobState::Queued, 0));
+        app.assert_sound().await;
+    }
+}
+
 /// Returns a worker with a job budget of 300 ms and a lease of 900 ms, whose attempts run these shell commands.
 fn hurried(app: &TestApp, commands: &str) -> Worker {
     let mut context = with_script(&app.context, commands);
