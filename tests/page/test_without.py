@@ -35,6 +35,38 @@ def test_flocks_swim_on_a_plain_canvas_without_webgl(page, filled_service):
     expect(flock_canvas(page)).to_have_accessible_name(said(page, "living.n", n=5))
 
 
+# The color in the upper left corner of a canvas, right after it was drawn; transparent black if it was not.
+CORNER = """(canvas) => new Promise((resolve) => requestAnimationFrame(() => {
+    const small = Object.assign(document.createElement("canvas"), { width: 48, height: 36 }).getContext("2d");
+    small.drawImage(canvas, 0, 0, 48, 36);
+    resolve([...small.getImageData(1, 1, 1, 1).data]);
+}))"""
+
+
+@pytest.mark.parametrize("script", ["", NO_WEBGL], ids=["webgl", "canvas"])
+def test_another_background_is_drawn_at_once(page, filled_service, script):
+    page.add_init_script(script)
+    page.goto(f"{filled_service}/studio?count=2&frames=60")
+    expect_swimming(page)
+
+    def shows(is_meant):
+        *color, alpha = flock_canvas(page).evaluate(CORNER)
+        return alpha == 255 and is_meant(color)
+
+    def is_blue(color):
+        # The color that is offered first: #103040.
+        return max(abs(a - b) for a, b in zip(color, (16, 48, 64), strict=True)) < 6
+
+    until(page, lambda: shows(lambda color: not is_blue(color)))
+    page.get_by_role("radio", name=say(page, "set.background.color"), exact=True).check()
+    until(page, lambda: shows(is_blue))
+    page.get_by_role("radio", name=say(page, "set.background.transparent")).check()
+    # Gray checkers.
+    until(page, lambda: shows(lambda color: max(color) - min(color) < 6 and min(color) > 140))
+    page.get_by_role("radio", name=say(page, "set.background.plate")).check()
+    until(page, lambda: shows(lambda color: max(color) - min(color) > 20 and not is_blue(color)))
+
+
 def test_lost_graphics_are_drawn_again(page, filled_service):
     page.goto(f"{filled_service}/studio?count=5&frames=60")
     expect_swimming(page)

@@ -105,12 +105,14 @@ export function truthLayer({ flock, plan, on, size, life, onChange, onProblem })
     // Near animals hide far ones; only then does the film shine through.
     if (layer.width !== canvas.width || layer.height !== canvas.height) [layer.width, layer.height] = [canvas.width, canvas.height];
     const pen = /** @type {CanvasRenderingContext2D} */ (layer.getContext("2d"));
-    pen.reset();
+    pen.clearRect(0, 0, layer.width, layer.height);
+    pen.save();
     pen.setTransform(zoom, 0, 0, zoom, left, top);
     pen.beginPath();
     pen.rect(0, 0, size()[0], size()[1]);
     pen.clip();
     drawShapes?.(pen, frame, rows);
+    pen.restore();
     context.globalAlpha = SHAPE_OPACITY;
     context.drawImage(layer, 0, 0);
     context.globalAlpha = 1;
