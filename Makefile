@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test fuzz soak arm-test docs deny bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -68,6 +68,9 @@ page-test: vendor ## test the page in a browser, against a running service
 contract-test: target/vendor ## test the API against its OpenAPI document, with schemathesis
 	$(CARGO) test --locked --workspace --no-run
 	@scripts/python-tests.sh contract $(DEBUG)
+
+fuzz: target/vendor ## run every fuzz target for FUZZ_SECONDS (60): make fuzz [TARGETS="plan poses"]
+	CARGO="$(CARGO)" scripts/fuzz.sh $(TARGETS)
 
 soak: target/vendor ## kill the service two hundred times during uploads
 	FLOCKREEL_KILLS=200 $(CARGO) test --locked --test it -- jobs::uploads

@@ -195,8 +195,8 @@ fn params_of(args: &Args) -> Result<Params, Error> {
     params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
 }
 
-/// Parses FRAME:X,Y.
-fn read_animal_at(text: &str) -> Result<Value, Error> {
+/// Parses FRAME:X,Y to the parameter `animal_at`.
+pub fn read_animal_at(text: &str) -> Result<Value, Error> {
     let parts = text.split_once(':').and_then(|(frame, point)| {
         let (x, y) = point.split_once(',')?;
         let frame: u32 = frame.trim().parse().ok()?;
@@ -210,8 +210,8 @@ fn read_animal_at(text: &str) -> Result<Value, Error> {
     Ok(json!({"frame": frame, "at_px": point}))
 }
 
-/// Parses X,Y,W,H or X,Y,W,H@FROM-TO.
-fn read_ignore(text: &str) -> Result<Value, Error> {
+/// Parses X,Y,W,H or X,Y,W,H@FROM-TO to an entry of the parameter `ignore`.
+pub fn read_ignore(text: &str) -> Result<Value, Error> {
     let wanted = || {
         let example = "10,20,200,40 or 10,20,200,40@0-2.5";
         Error::Usage(format!(

@@ -10,7 +10,7 @@ use flockreel_core::parameters::{Parameters, Schemas};
 
 /// Overrides parameters with the values of `--set`. Fails where one has no `=`, or a name leads into a value that is
 /// not an object.
-pub(super) fn apply(settings: &[String], overrides: &mut Map<String, Value>) -> Result<(), Error> {
+pub fn apply(settings: &[String], overrides: &mut Map<String, Value>) -> Result<(), Error> {
     for setting in settings {
         let (name, value) = setting
             .split_once('=')
@@ -52,8 +52,12 @@ pub(super) fn parameter_help<P: Parameters>(name: &str) -> String {
         &schema["maximum"],
         &schema["exclusiveMinimum"],
     ) {
-        (min, max, _) if max.is_number() => help += &format!(" Limits: {min} to {max}."),
-        (_, _, min) if min.is_number() => help += &format!(" Above {min}."),
+        (min, max, _) if min.is_number() && max.is_number() => {
+            help += &format!(" Limits: {min} to {max}.");
+        }
+        (_, max, min) if min.is_number() && max.is_number() => {
+            help += &format!(" Above {min}, at most {max}.");
+        }
         _ => {}
     }
     let mut help = help.trim_end_matches('.').to_owned();
@@ -125,6 +129,9 @@ mod tests {
             "{help}"
         );
         let help = parameter_help::<flockreel_core::analysis::Params>("kappa");
-        assert!(help.ends_with("Above 0 [default: 2.0]"), "{help}");
+        assert!(
+            help.ends_with("Above 0, at most 1000000 [default: 2.0]"),
+            "{help}"
+        );
     }
 }

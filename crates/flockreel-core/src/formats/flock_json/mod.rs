@@ -3,11 +3,13 @@
 //! A flock holds rounded numbers, so reading returns exactly what was written. Each plan's cost can be
 //! recomputed from this file and the library (docs/explanation/algorithms.md, "Planning").
 
+mod limits; // of the numbers in a file
 mod space; // the tank and how it is seen
 mod stats; // quality of the flock, and its order in every frame
 
 use std::io::{self, Write};
 
+use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
 
 use self::space::SpaceFile;
@@ -57,10 +59,10 @@ pub(super) fn stats(flock: &Flock) -> serde_json::Value {
     serde_json::to_value(file).expect("plain values serialise")
 }
 
-/// Parses the output of `write`.
+/// Parses the output of `write`. Fails if a number is beyond what a flock can have.
 pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
     let file: FlockFile<Vec<IndividualFile>> = serde_json::from_slice(bytes)?;
-    Ok(Flock {
+    let flock = Flock {
         fps: file.fps,
         image_size_px: file.image_size_px,
         length_px: file.length_px,
@@ -74,7 +76,10 @@ pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
             .collect(),
         orders: file.stats.orders()?,
         stats: file.stats.stats,
-    })
+    };
+    limits::check(&flock)
+        .map(|()| flock)
+        .map_err(|name| serde_json::Error::custom(format!("{name} is out of range")))
 }
 
 #[derive(Serialize, Deserialize)]
