@@ -31,7 +31,8 @@ RUSTFLAGS=$(echo $coverage) ${CARGO:-cargo} build --release --manifest-path fuzz
 memory=/dev/shm
 if [ ! -w "$memory" ]; then memory=/tmp; fi
 TMPDIR=$(mktemp -d "$memory/flockreel-fuzz.XXXXXX")
-export TMPDIR
+# Threads reserve address space, which is limited, for stacks and arenas.
+export TMPDIR MALLOC_ARENA_MAX=2 RAYON_NUM_THREADS=2
 trap 'rm -rf "$TMPDIR"' EXIT
 
 faults=

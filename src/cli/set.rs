@@ -25,6 +25,13 @@ pub fn apply(settings: &[String], overrides: &mut Map<String, Value>) -> Result<
     Ok(())
 }
 
+/// Parses a number. JSON has no infinity: a number such as 1e999 would become null, and so the default.
+pub(super) fn finite(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_not_a_number| "not a number")?;
+    let too_large = || "the number must be finite".to_owned();
+    number.is_finite().then_some(number).ok_or_else(too_large)
+}
+
 /// Returns the help of `--set`, with an example of the command.
 pub(super) fn help(example: &str) -> String {
     format!(
@@ -89,7 +96,10 @@ fn insert(fields: &mut Map<String, Value>, name: &str, value: Value) -> Option<(
 
 #[cfg(test)]
 mod tests {
+    use clap::CommandFactory;
+
     use super::*;
+    use crate::cli::Cli;
 
     fn applied(set: &[&str]) -> Result<Value, String> {
         let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
@@ -112,6 +122,29 @@ mod tests {
         assert!(applied(&["seed"]).unwrap_err().contains("NAME=JSON"));
         let sentence = applied(&["rules.alignment.x=1"]).unwrap_err();
         assert!(sentence.contains("rules.alignment.x"), "{sentence}");
+    }
+
+    #[test]
+    fn infinite_number_is_no_default() {
+        assert_eq!(finite("2.5"), Ok(2.5));
+        for text in ["1e999", "inf", "-inf", "NaN", "", "1,5"] {
+            assert!(finite(text).is_err(), "{text}");
+        }
+        for line in [
+            "analyze a -o b --fps",
+            "analyze a -o b --pixel-aspect",
+            "analyze a -o b --from",
+            "analyze a -o b --to",
+            "analyze a -o b --animal-height 1 --animal-length",
+            "analyze a -o b --animal-length 1 --animal-height",
+            "flock a -o b --spacing",
+            "flock a -o b --haze",
+            "flock a -o b --shadow",
+        ] {
+            let line = format!("flockreel {line} 1e999");
+            let parsed = Cli::command().try_get_matches_from(line.split(' '));
+            assert!(parsed.unwrap_err().to_string().contains("finite"), "{line}");
+        }
     }
 
     #[test]

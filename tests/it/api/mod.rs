@@ -19,6 +19,7 @@ mod one_call;
 mod owners;
 mod parameters;
 mod pictures;
+mod slow_clients;
 mod synchronous;
 mod uploads;
 mod wait;

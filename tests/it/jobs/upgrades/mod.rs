@@ -202,8 +202,11 @@ async fn assert_results_are_served(app: &TestApp, schema: i64) {
 /// Rows before owners belong to local requests. Tokens and sessions give access to the things of their owner only.
 async fn assert_owners_have_their_things(app: &TestApp, schema: i64) {
     let of_ann = format!("/v1/footage/{}", id(2));
-    let local = app.get(&of_ann).send().await.unwrap();
-    assert_eq!(code_of(local, 404).await, "not_found");
+    let job_of_ann = format!("/v1/jobs/{}", id(24));
+    for path in [&of_ann, &job_of_ann] {
+        let local = app.get(path).send().await.unwrap();
+        assert_eq!(code_of(local, 404).await, "not_found");
+    }
     if schema < 6 {
         return;
     }
@@ -214,6 +217,7 @@ async fn assert_owners_have_their_things(app: &TestApp, schema: i64) {
         let with = async |path: &str| app.get(path).header(name, &value).send().await.unwrap();
         let footage: Value = json_of(with(&of_ann).await, StatusCode::OK).await;
         assert_eq!(footage["name"], "film of ann");
+        assert_eq!(with(&job_of_ann).await.status(), 200);
         let foreign = with(&format!("/v1/footage/{}", id(1))).await;
         assert_eq!(code_of(foreign, 404).await, "not_found");
     }

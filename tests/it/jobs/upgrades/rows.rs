@@ -67,7 +67,10 @@ pub(super) const ROWS: [(i64, &str); 12] = [
         5,
         "insert into footage (id, owner, folder, sha256, background_sha256, name, size_bytes, width, height, fps,
             n_frames_hint, sample, created_ms) values (@2, 'ann', 'footage/2', #film, #none, 'film of ann', 26, 64, 48,
-            25.0, 10, @false, 1001);",
+            25.0, 10, @false, 1001);
+        insert into jobs (id, owner, kind, state, input, result_id, priority, run_at_ms, attempt, fence, code, detail,
+            created_ms, started_ms, finished_ms) values
+            (@24, 'ann', 'flock', 'failed', '{}', @34, 0, 0, 1, 1, 'internal', 'Failed.', 5000, 5001, 5002);",
     ),
     (
         6,

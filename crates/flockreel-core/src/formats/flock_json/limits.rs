@@ -27,8 +27,9 @@ const COST_RAD: RangeInclusive<f64> = 0.0..=1e9;
 const POSITIVE: RangeInclusive<f64> = 1e-9..=1e9;
 
 /// Fails with the name of the first value that is out of range.
-pub(super) fn check(flock: &Flock) -> Result<(), &'static str> {
-    let require = |holds: bool, name| holds.then_some(()).ok_or(name);
+pub(super) fn check(flock: &Flock) -> Result<(), String> {
+    let out_of_range = |name: &str| format!("{name} is out of range");
+    let require = |holds: bool, name| holds.then_some(()).ok_or_else(|| out_of_range(name));
     let sides_px = flock.image_size_px;
     require(FPS.contains(&flock.fps), "fps")?;
     require(

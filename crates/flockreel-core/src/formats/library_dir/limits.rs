@@ -213,3 +213,86 @@ fn check_summary(summary: &Summary, n_frames: usize) -> Result<(), Error> {
 fn is_shadow(shadow: &Shadow) -> bool {
     lie([shadow.darkness, shadow.blur_bl], &SHARE) && lie(shadow.offset_bl, &(-1.0..=1.0))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use serde_json::Value;
+
+    use super::super::{read, write};
+    use super::*;
+    use crate::analysis::Params;
+    use crate::flock::synthetic;
+    use crate::formats::library_json::FootageSummary;
+    use crate::library::View;
+    use crate::scratch::InMemory;
+
+    /// Returns the sentence with which a library is refused if a value of a file is replaced.
+    fn refusal(folder: &Path, file: &str, pointer: &str, value: &Value) -> String {
+        let path = folder.join(file);
+        let before = fs::read(&path).expect("a file");
+        let mut json: Value = serde_json::from_slice(&before).expect("JSON");
+        let (parent, field) = pointer.rsplit_once('/').expect("a pointer");
+        let parent = json.pointer_mut(parent).expect(pointer);
+        match parent {
+            Value::Array(items) => items[field.parse::<usize>().expect(pointer)] = value.clone(),
+            parent => parent[field] = value.clone(),
+        }
+        fs::write(&path, json.to_string()).expect("written");
+        let found = read(folder, Arc::new(InMemory::default()));
+        fs::write(&path, before).expect("written");
+        found.err().map_or(String::new(), |error| error.to_string())
+    }
+
+    /// File, place and value of numbers out of range. The sentence names the first part of the place.
+    const BEYOND: &str = r#"
+        poses.json /fps 1e308
+        poses.json /fps 0.0
+        poses.json /image_size_px [70000,70000]
+        poses.json /camera {"z_min_m":1e-308,"pane_px_per_m":1.0,"center_px":[0.0,0.0],"medium_index":1.0}
+        poses.json /animal {"length_m":1e308,"height_m":1.0}
+        poses.json /frames/3/time_s 1e308
+        poses.json /frames/3/centroid_px/1 -1e308
+        poses.json /frames/3/heading_rad 1e308
+        poses.json /frames/3/length_px -1.0
+        poses.json /frames/3/box_px [4294967295,0,4294967295,1]
+        poses.json /frames/3/forward/0 2.0
+        poses.json /frames/3/midline_px [[0.0,0.0]]
+        library.json /clip_frames 1152921504606846976
+        library.json /clip_frames 0
+        library.json /epsilon 18446744073709551615
+        library.json /component/1 0
+        library.json /playback/0 [0,4294967295,1]
+        library.json /transitions/0/to 600
+        library.json /patches/0/next/0 7
+        library.json /sprite_size_px [16384,16384]
+        library.json /stats/length_px 1e308
+        library.json /stats/speed_bl_per_s/1 1e308
+        library.json /params/kappa 1e308"#;
+
+    #[test]
+    fn numbers_beyond_any_footage_are_refused_by_name() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let folder = folder.path();
+        let library = synthetic::library(View::Side);
+        let footage = FootageSummary {
+            sha256: "ab".into(),
+            n_bytes: 9,
+        };
+        write(folder, &library, &Params::default(), &footage).expect("written");
+        assert_eq!(refusal(folder, "poses.json", "/fps", &30.0.into()), "");
+        for line in BEYOND.trim().lines() {
+            let mut parts = line.split_whitespace();
+            let mut part = || parts.next().expect(line);
+            let (file, pointer, value) = (part(), part(), part());
+            let value = serde_json::from_str(value).expect(line);
+            let sentence = refusal(folder, file, pointer, &value);
+            let name = pointer.split('/').nth(1).expect(line);
+            let start = format!("out of range: {name}");
+            assert!(sentence.starts_with(&start), "{line}: {sentence}");
+        }
+    }
+}
