@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test stress-test soak kills arm-test docs deny bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test stress-test fuzz soak kills arm-test docs deny bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -86,6 +86,9 @@ kills: target/vendor ## kill the service two hundred times on each engine; keep 
 	FLOCKREEL_KILLS=200 $(CARGO) test --locked --test it -- jobs::uploads jobs::kills
 	FLOCKREEL_KILLS=200 scripts/with-servers.sh $(CARGO) test --locked --test it -- jobs::uploads jobs::kills
 	FLOCKREEL_FULL_SECONDS=60 $(CARGO) test --locked --test it -- jobs::full_disk::every_request
+
+fuzz: target/vendor ## run every fuzz target for FUZZ_SECONDS (60): make fuzz [TARGETS="plan poses"]
+	CARGO="$(CARGO)" scripts/fuzz.sh $(TARGETS)
 
 # Not part of `check`, because it takes half an hour. ARM_TESTS=analysis::distance selects the kernels only.
 ARM = aarch64-unknown-linux-gnu

@@ -241,15 +241,18 @@ impl FromStr for Database {
     type Err = String;
 
     fn from_str(url: &str) -> Result<Database, String> {
+        let wrong = || "the database must be sqlite:PATH or postgres://USER:PASSWORD@HOST/NAME";
         match url.split_once(':') {
-            Some(("sqlite", path)) if !path.is_empty() => {
-                let path = path.strip_prefix("//").unwrap_or(path);
-                Ok(Database::Sqlite(PathBuf::from(path)))
+            Some(("sqlite", path)) => {
+                let file = PathBuf::from(path.strip_prefix("//").unwrap_or(path));
+                // SQLite would take an empty path for a database that is deleted at the end.
+                let is_file = file.file_name().is_some();
+                is_file
+                    .then_some(Database::Sqlite(file))
+                    .ok_or(wrong().into())
             }
             Some(("postgres" | "postgresql", _)) => Ok(Database::Postgres(url.to_owned())),
-            _ => Err(
-                "the database must be sqlite:PATH or postgres://USER:PASSWORD@HOST/NAME".to_owned(),
-            ),
+            _ => Err(wrong().to_owned()),
         }
     }
 }
@@ -296,4 +299,29 @@ pub fn default_workers() -> NonZeroUsize {
 /// Returns the number of cores that this process may use, at least 1.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn database_must_name_a_file_or_a_server() {
+        let sqlite = |path: &str| Ok(Database::Sqlite(PathBuf::from(path)));
+        assert_eq!("sqlite:a/b.db".parse(), sqlite("a/b.db"));
+        assert_eq!("sqlite:///a/b.db".parse(), sqlite("/a/b.db"));
+        let server = "postgres://h/name".to_owned();
+        assert_eq!(server.parse(), Ok(Database::Postgres(server)));
+        for wrong in [
+            "sqlite:",
+            "sqlite://",
+            "sqlite:///",
+            "sqlite:..",
+            "mysql://h",
+            "",
+        ] {
+            let sentence = wrong.parse::<Database>().unwrap_err();
+            assert!(sentence.starts_with("the database must be"), "{wrong}");
+        }
+    }
 }

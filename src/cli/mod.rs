@@ -19,7 +19,7 @@ pub mod matrix;
 pub mod progress;
 pub mod sample;
 pub mod serve;
-mod set;
+pub mod set;
 pub mod sprites;
 pub mod token;
 pub mod worker;

@@ -33,6 +33,7 @@ pub use gate::ProcessGroup;
 pub use image::{decode_image, read_image};
 pub use limits::Limits;
 pub use notice::Notice;
+pub use probe::check_ffprobe_output;
 pub use read_options::ReadOptions;
 pub use sandbox::{Layer, Layers};
 pub use tools::{

@@ -20,6 +20,7 @@ mod one_call;
 mod owners;
 mod parameters;
 mod pictures;
+mod slow_clients;
 mod synchronous;
 mod uploads;
 mod wait;

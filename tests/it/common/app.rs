@@ -50,7 +50,11 @@ impl TestApp {
 
     /// Starts a service without workers and with additional command-line flags.
     pub(crate) async fn start(flags: &[&str]) -> TestApp {
-        let place = Place::from_environment();
+        TestApp::on(Place::from_environment(), flags).await
+    }
+
+    /// Like [`TestApp::start`], on a place that may have data.
+    pub(crate) async fn on(place: Place, flags: &[&str]) -> TestApp {
         let flags = flags.iter().map(|flag| (*flag).to_owned());
         let flags = [vec!["test".to_owned()], place.flags(), flags.collect()].concat();
         let config = Arguments::parse_from(flags).config;

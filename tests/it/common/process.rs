@@ -168,6 +168,14 @@ impl Server {
         request.send().await.unwrap()
     }
 
+    /// Returns the resident memory of the process, bytes.
+    pub(crate) fn resident_bytes(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+        let kib = line.unwrap().trim().trim_end_matches(" kB");
+        kib.parse::<u64>().unwrap() << 10
+    }
+
     /// Uploads a film and returns the response.
     pub(crate) async fn upload(&self, film: Vec<u8>) -> Response {
         let request = self.client.post(format!("{}/v1/footage", self.base));

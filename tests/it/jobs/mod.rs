@@ -10,4 +10,5 @@ mod races;
 mod sample;
 mod steps;
 mod sweeps;
+mod upgrades;
 mod uploads;
