@@ -8,6 +8,7 @@ import { setTitle } from "../app/router.js";
 import { percent, say, stageOf } from "../app/words.js";
 import { filmCard } from "../parts/cards.js";
 import { fileButton } from "../parts/drop.js";
+import { pinButton, spaceSentence } from "../parts/pin.js";
 import { problemBox } from "../parts/problem.js";
 import { deleted, deleteLater } from "../parts/undo.js";
 
@@ -25,8 +26,9 @@ export async function show(root, { life }) {
   const empty = element("div.empty", { hidden: true }, element("p", {}, say("films.empty")), element("p.actions", {}, fileButton(say("home.choose"))));
   const found = element("p.soft", { role: "status" });
   const trouble = element("div");
+  const space = element("p.soft.narrow");
   root.append(element("header.place-head", {}, element("h1", { tabIndex: -1 }, say("films.title")), element("div.actions", {}, search, fileButton(say("home.choose")))),
-    element("p.soft.narrow", {}, say("films.help")), found, trouble, empty, cards, element("p", {}, more));
+    element("p.soft.narrow", {}, say("films.help")), space, found, trouble, empty, cards, element("p", {}, more));
   /** @type {Entry[]} */
   let all = [];
   /** @type {any[]} */
@@ -40,7 +42,8 @@ export async function show(root, { life }) {
     const state = element("p.film-state");
     const name = filmName(film);
     const drop = element("button.quiet.small", { type: "button", "aria-label": say("reels.delete.of", { name }), onclick: () => deleteLater({ id: film.id, path: `/v1/footage/${film.id}`, name }).focus() }, say("film.delete"));
-    const node = filmCard(film, { library: libraries.find((library) => library.footage_id === film.id), state: element("div.film-foot", {}, state, drop) });
+    const pin = pinButton({ path: `/v1/footage/${film.id}`, isPinned: film.pinned, name }, tell);
+    const node = filmCard(film, { library: libraries.find((library) => library.footage_id === film.id), state: element("div.film-foot", {}, state, pin, drop) });
     return { film, node, state };
   };
   const sift = () => {
@@ -89,13 +92,18 @@ export async function show(root, { life }) {
     tellStates();
   };
   deleted.watch(sift, life);
+  const tellSpace = () => spaceSentence(life).then((sentence) => { space.textContent = sentence; }).catch(() => {});
+  tellSpace();
   await fill();
   let known = "";
   jobs.watch((every) => {
     tellStates();
     // A new job may be of a new film, a done one makes a library.
     const now = every.filter((job) => job.kind !== "flock").map((job) => job.id + (job.state === "done")).join();
-    if (known && now !== known) refresh().catch(() => {});
+    if (known && now !== known) {
+      refresh().catch(() => {});
+      tellSpace();
+    }
     known = now || "none";
   }, life);
 }
