@@ -55,6 +55,48 @@ pub struct Config {
         value_name = "N"
     )]
     pub disk_reserve_bytes: u64,
+    /// Space of each owner.
+    #[command(flatten)]
+    pub owner_space: OwnerSpace,
+    /// Deletion of old data.
+    #[command(flatten)]
+    pub retention: Retention,
+}
+
+/// Limit of the space that each owner may use.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct OwnerSpace {
+    /// Maximum total size of the stored files and open uploads of one owner, bytes; 0 sets no limit.
+    #[arg(
+        long,
+        env = "FLOCKREEL_MAX_OWNER_BYTES",
+        default_value_t = OwnerSpace::MAX_OWNER_BYTES,
+        value_name = "N"
+    )]
+    pub max_owner_bytes: u64,
+}
+
+/// Ages at which data is deleted.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct Retention {
+    /// Days after which footage, libraries, flocks and virtual fish that nobody used are deleted; 0 keeps them. Pinned
+    /// ones stay, and so does everything that a kept one was made from.
+    #[arg(
+        long,
+        env = "FLOCKREEL_KEEP_DAYS",
+        default_value_t = 0,
+        value_name = "N"
+    )]
+    pub keep_days: u32,
+    /// Days after which failed and cancelled jobs are deleted; 0 keeps them. Jobs that are done are deleted with their
+    /// results.
+    #[arg(
+        long,
+        env = "FLOCKREEL_KEEP_JOBS_DAYS",
+        default_value_t = Retention::KEEP_JOBS_DAYS,
+        value_name = "N"
+    )]
+    pub keep_jobs_days: u32,
 }
 
 /// Settings of the media tools, for every command that reads or writes video.
@@ -197,6 +239,31 @@ impl Config {
     pub fn requires_tokens(&self) -> bool {
         self.auth == Auth::Required || !self.bind.ip().is_loopback()
     }
+}
+
+impl OwnerSpace {
+    /// Default limit of an owner, bytes: half of a disk of 64 GiB, so that one owner alone does not fill it.
+    pub const MAX_OWNER_BYTES: u64 = 32 << 30;
+}
+
+impl Retention {
+    /// Default age at which failed and cancelled jobs are deleted, days. Free choice.
+    pub const KEEP_JOBS_DAYS: u32 = 90;
+
+    /// Returns the time before which unused resources are deleted, milliseconds since 1970; `None` if they are kept.
+    pub fn unused_before_ms(&self, now_ms: i64) -> Option<i64> {
+        days_before(self.keep_days, now_ms)
+    }
+
+    /// Returns the time before which failed and cancelled jobs are deleted, milliseconds since 1970; `None` if they
+    /// are kept.
+    pub fn jobs_before_ms(&self, now_ms: i64) -> Option<i64> {
+        days_before(self.keep_jobs_days, now_ms)
+    }
+}
+
+fn days_before(n_days: u32, now_ms: i64) -> Option<i64> {
+    (n_days > 0).then(|| now_ms - i64::from(n_days) * 24 * 3600 * 1000)
 }
 
 impl JobSettings {

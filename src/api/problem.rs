@@ -213,7 +213,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         | Code::InputFailed
         | Code::IdempotencyKeyReused
         | Code::InvalidParams => StatusCode::UNPROCESSABLE_ENTITY,
-        Code::StorageFull => StatusCode::INSUFFICIENT_STORAGE,
+        Code::StorageFull | Code::OwnerStorageFull => StatusCode::INSUFFICIENT_STORAGE,
         // A cancelled job has no result. Only requests for the result get its code.
         Code::NotFound | Code::NotReady | Code::Cancelled => StatusCode::NOT_FOUND,
         Code::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,

@@ -86,7 +86,8 @@ enum Command {
     Token(token::Args),
     /// Check the data folder: every file must match its row and hash, and every job must have a valid state.
     Check(check::Args),
-    /// Remove unused data: leftovers of crashes, and expired uploads, sessions and stored responses.
+    /// Remove unused data: leftovers of crashes, expired uploads, sessions and stored responses, and what is older than the
+    /// settings allow.
     Gc(gc::Args),
     /// Copy the data folder, even while a service uses it. To restore, run `serve --data` on the copy.
     Backup(backup::Args),

@@ -48,7 +48,7 @@ pub use id_sequence::IdSequence;
 pub use listener::{Listener, Stages};
 pub use meters::Meters;
 
-use crate::config::JobSettings;
+use crate::config::{JobSettings, Retention};
 use crate::store::jobs::Kind;
 use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::retry::Retry;
@@ -83,6 +83,8 @@ pub struct Context {
     pub sweep_every: Duration,
     /// Maximum number of queued and running jobs of all owners.
     pub max_queued: i64,
+    /// Ages at which data is deleted.
+    pub retention: Retention,
     /// Free disk space below which jobs are stopped, bytes. It keeps space for the database.
     pub min_free_bytes: u64,
     /// Metrics of the jobs of this process.
@@ -172,6 +174,7 @@ impl Context {
             budget: Duration::from_secs(JobSettings::JOB_TIME_S),
             sweep_every: Duration::from_secs(3600),
             max_queued: i64::MAX,
+            retention: Retention::default(),
             min_free_bytes: 0,
             meters: Meters::default(),
             upload_checks: ConcurrencyLimit::per_core(),

@@ -30,6 +30,8 @@ export default {
   "film.unnamed": "a film", "film.sample": "virtual goldfish", "film.deleted": "a deleted film", "film.measured": "measured", "film.not_measured": "not measured", "film.measure": "Measure the film",
   "film.flock": "The film is measured. This is its flock.", "film.wait": "A film is being measured. Its flock appears here as soon as it is ready.", "film.next": "In the studio you choose how many there are, how they move and what is behind them, and make the film.", "film.known": "You have this film already. This is its flock.", "film.cancelled": "You cancelled the measurement.", "film.delete": "Delete", "film.unplayable": "This browser cannot play the film. It can still be measured.", "film.studio": "Make a flock", "film.desk": "See the measurement",
   "films.title": "Films", "films.help": "Drop films anywhere on the page. A good film has one animal, a fixed camera and steady light, and lasts half a minute or more.",
+  "pin": "Pin", "pin.of": "Pin: {name}", "pin.help": "What is pinned stays, even if nobody uses it", "space.used": "Your films and flocks take {used}.", "space.of": "Your films and flocks take {used} of {max}.",
+  "space.keep": { one: "What nobody uses for {n} day is deleted, unless it is pinned.", other: "What nobody uses for {n} days is deleted, unless it is pinned." },
   "films.empty": "No films yet. Drop one here, or choose it.", "films.search": "Search by name", "films.found": { one: "{n} film", other: "{n} films" },
   "flock.of": "{n} × {film}", "flock.seed": "seed {seed}",
   "home.title": "Film one animal. Get a flock of it.", "home.choose": "Choose a film", "home.camera": "Film with the camera", "home.recent": "Recent", "home.drop": "or drop it anywhere on this page", "home.stage": "The newest flock",

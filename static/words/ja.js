@@ -29,6 +29,8 @@ export default {
   "film.unnamed": "名前のない動画", "film.sample": "仮想の金魚", "film.deleted": "削除された動画", "film.measured": "計測済み", "film.not_measured": "未計測", "film.measure": "動画を計測",
   "film.flock": "計測が終わりました。これがその群れです。", "film.wait": "動画を計測しています。終わると、ここに群れが現れます。", "film.next": "スタジオで、個体数、動き方、背景を選び、動画を作成します。", "film.known": "この動画はすでに登録されています。これがその群れです。", "film.cancelled": "計測を中止しました。", "film.delete": "削除", "film.unplayable": "このブラウザーでは元の動画を再生できませんが、計測はできます。", "film.studio": "群れを作る", "film.desk": "計測結果を見る",
   "films.title": "動画", "films.help": "動画はこのページのどこにでもドロップできます。動物1個体を固定したカメラと一定の明るさで30秒以上撮影した動画が適しています。",
+  "pin": "固定", "pin.of": "固定：{name}", "pin.help": "固定したものは、使われなくても残ります", "space.used": "動画と群れの使用量：{used}", "space.of": "動画と群れの使用量：{used}（上限 {max}）",
+  "space.keep": "{n}日間使われないものは、固定されていなければ削除されます。",
   "films.empty": "動画はまだありません。ここにドロップするか、ファイルを選んでください。", "films.search": "名前で検索", "films.found": "{n}件の動画",
   "flock.of": "{film} × {n}個体", "flock.seed": "シード{seed}",
   "home.title": "動物を1個体撮影すると、群れになります。", "home.choose": "動画を選ぶ", "home.camera": "カメラで撮影", "home.recent": "最近の項目", "home.drop": "または、このページにドロップ", "home.stage": "最新の群れ",

@@ -78,6 +78,9 @@ codes! {
     StorageFull "storage_full" "The disk has too little free space."
         "Delete results that are no longer needed, or ask the operator of the service for more disk space. Then try \
          again."
+    OwnerStorageFull "owner_storage_full" "The stored files and open uploads of the owner have reached their limit."
+        "Delete films, libraries, flocks or virtual fish that are no longer needed, or cancel open uploads; `GET /v1/usage` \
+         shows what takes the space. Or ask the operator of the service for a higher limit (`--max-owner-bytes`)."
     // Analysis (docs/explanation/algorithms.md, "Refused footage").
     NothingMoves "nothing_moves" "No moving animal was found in the film."
         "Film an animal that moves and that differs from the background in color or brightness. Or send a picture of \

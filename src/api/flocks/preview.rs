@@ -46,6 +46,7 @@ pub(in crate::api) async fn preview_flock(
     }
     let library_id = access.id_of::<Library>(request.library_id).await?;
     let library = access.find::<Library>(library_id).await?;
+    access.note_use::<Library>(&library);
     let accepted = headers.get(header::ACCEPT);
     let accepted = accepted.and_then(|value| value.to_str().ok());
     let mut types = accepted.unwrap_or_default().split(',');

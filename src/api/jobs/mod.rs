@@ -216,7 +216,8 @@ pub(super) async fn job_to_follow(
 ) -> Result<Option<JobId>, Problem> {
     let store = access.store();
     let library = store.resource::<Library>(library_id.0, &access.caller.owners);
-    if library.await?.is_some() {
+    if let Some(library) = library.await? {
+        access.note_use::<Library>(&library);
         return Ok(None);
     }
     match store

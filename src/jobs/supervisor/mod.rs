@@ -130,7 +130,7 @@ async fn listen(context: Context) {
     }
 }
 
-/// Sweeps expired data at regular intervals, for services that run for months.
+/// Sweeps expired and old data at regular intervals, for services that run for months.
 async fn sweep(context: Context) {
     loop {
         tokio::select! {
@@ -140,7 +140,19 @@ async fn sweep(context: Context) {
         if let Err(error) = sweep_expired(&context.store).await {
             tracing::error!(%error, "the sweep of expired data failed");
         }
+        if let Err(error) = retire(&context).await {
+            tracing::error!(%error, "the deletion of old data failed");
+        }
     }
+}
+
+/// Deletes data that is older than the settings allow. This does not happen at the start, so that an operator who starts
+/// the service on an old backup has time to change the settings.
+async fn retire(context: &Context) -> Result<(), store::Error> {
+    let now_ms = context.now_ms().await?;
+    let retired = context.store.retire(context.retention, now_ms).await?;
+    context.meters.count_retired(&retired);
+    Ok(())
 }
 
 /// Removes expired uploads and idempotency keys, drafts of processes that have ended, and folders that no row

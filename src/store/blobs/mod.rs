@@ -297,7 +297,9 @@ impl Store {
 fn is_rejection(error: &Error) -> bool {
     matches!(
         error,
-        Error::Sql(sqlx::Error::Database(_)) | Error::AlreadyStored
+        Error::Sql(sqlx::Error::Database(_))
+            | Error::AlreadyStored
+            | Error::OwnerStorageFull { .. }
     ) || error.code() == Code::StorageFull
 }
 

@@ -9,6 +9,8 @@ use crate::store::owners::{Account, Owner};
 use crate::store::{Error, Store, Transaction, sql};
 use flockreel_core::ids::JobId;
 
+/// Named lock of transactions that add jobs.
+pub(in crate::store) const QUEUE_LOCK: &str = "queue";
 /// Name of the notification about new jobs.
 pub(super) const QUEUED: &str = "flockreel_jobs";
 
@@ -47,7 +49,7 @@ impl Store {
     /// differs.
     pub async fn enqueue(&self, job: &NewJob, now_ms: i64) -> Result<(), Error> {
         let mut transaction = self.begin().await?;
-        transaction.lock("queue").await?;
+        transaction.lock(QUEUE_LOCK).await?;
         if is_queued_already(&mut transaction, job).await? {
             return Ok(());
         }

@@ -8,6 +8,7 @@ import { setTitle } from "../app/router.js";
 import { percent, say, stageOf } from "../app/words.js";
 import { filmCard } from "../parts/cards.js";
 import { fileButton } from "../parts/drop.js";
+import { pinButton, spaceSentence } from "../parts/pin.js";
 import { problemBox } from "../parts/problem.js";
 import { deleted, deleteLater } from "../parts/undo.js";
 
@@ -25,8 +26,9 @@ export async function show(root, { life }) {
   const empty = element("div.empty", { hidden: true }, element("p", {}, say("films.empty")), element("p.actions", {}, fileButton(say("home.choose"))));
   const found = element("p.soft", { role: "status" });
   const trouble = element("div");
+  const space = element("p.soft.narrow");
   root.append(element("header.place-head", {}, element("h1", { tabIndex: -1 }, say("films.title")), element("div.actions", {}, search, fileButton(say("home.choose")))),
-    element("p.soft.narrow", {}, say("films.help")), found, trouble, empty, cards, element("p", {}, more));
+    element("p.soft.narrow", {}, say("films.help")), space, found, trouble, empty, cards, element("p", {}, more));
   /** @type {Entry[]} */
   let all = [];
   /** @type {string | null} */
@@ -39,7 +41,8 @@ export async function show(root, { life }) {
     const state = element("p.film-state");
     const name = filmName(film);
     const drop = element("button.quiet.small", { type: "button", "aria-label": say("reels.delete.of", { name }), onclick: () => deleteLater({ id: film.id, path: `/v1/footage/${film.id}`, name }).focus() }, say("film.delete"));
-    return { film, library, node: filmCard(film, { library, state: element("div.film-foot", {}, state, drop) }), state };
+    const pin = pinButton({ path: `/v1/footage/${film.id}`, isPinned: film.pinned, name }, tell);
+    return { film, library, node: filmCard(film, { library, state: element("div.film-foot", {}, state, pin, drop) }), state };
   };
   /** Makes the entries of films that are not shown yet. @param {any[]} films */
   const entriesOf = async (films) => {
@@ -90,6 +93,8 @@ export async function show(root, { life }) {
     tellStates();
   };
   deleted.watch(sift, life);
+  const tellSpace = () => spaceSentence(life).then((sentence) => { space.textContent = sentence; }).catch(() => {});
+  tellSpace();
   await fill();
   /** Jobs and their states that the cards show. */
   let known = new Set(jobs.value.map(stateKey));
@@ -98,7 +103,10 @@ export async function show(root, { life }) {
     // A new job may be of a new film, a done one makes a library.
     const fresh = every.filter((job) => job.kind !== "flock" && !known.has(stateKey(job)));
     known = new Set(every.map(stateKey));
-    if (fresh.length) refresh(new Set(fresh.map((job) => job.subject?.id))).catch(() => {});
+    if (fresh.length) {
+      refresh(new Set(fresh.map((job) => job.subject?.id))).catch(() => {});
+      tellSpace();
+    }
   }, life);
 }
 

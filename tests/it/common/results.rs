@@ -71,9 +71,12 @@ pub(crate) async fn store_film(app: &TestApp, film: &[u8], sample: bool) -> Stri
         fps: 30.0,
         n_frames_hint: 300,
         sample,
+        pinned: false,
+        used_ms: 0,
         created_ms: 0,
     };
-    store.add_footage(footage, draft, &files).await.unwrap();
+    let added = store.add_footage(footage, draft, &files, None);
+    added.await.unwrap();
     id.to_string()
 }
 
