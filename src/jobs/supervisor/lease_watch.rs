@@ -20,7 +20,10 @@ impl LeaseWatch {
         now: Instant,
     ) -> Vec<HeldLease> {
         let seen = |lease: &HeldLease| self.0.get(lease).copied().unwrap_or(now);
-        self.0 = held.into_iter().map(|lease| (lease, seen(&lease))).collect();
+        self.0 = held
+            .into_iter()
+            .map(|lease| (lease, seen(&lease)))
+            .collect();
         let mut ended: Vec<_> = (self.0.iter())
             .filter(|(_, since)| now.saturating_duration_since(**since) >= duration)
             .map(|(lease, _)| *lease)
@@ -50,7 +53,10 @@ mod tests {
         // A heartbeat of a worker whose clock has jumped back.
         assert_eq!(watch.ended(vec![lease(-9)], duration, after(14)), []);
         assert_eq!(watch.ended(vec![lease(-9)], duration, after(28)), []);
-        assert_eq!(watch.ended(vec![lease(-9)], duration, after(29)), [lease(-9)]);
+        assert_eq!(
+            watch.ended(vec![lease(-9)], duration, after(29)),
+            [lease(-9)]
+        );
         assert_eq!(watch.ended(Vec::new(), duration, after(30)), []);
         assert_eq!(watch.ended(vec![lease(-9)], duration, after(31)), []);
     }

@@ -101,7 +101,14 @@ impl Store {
             } else {
                 JobState::Queued
             };
-            settle(&mut transaction, job.lease.job_id, lone_crashes, state, now_ms).await?;
+            settle(
+                &mut transaction,
+                job.lease.job_id,
+                lone_crashes,
+                state,
+                now_ms,
+            )
+            .await?;
             rescued.push((JobId(job.lease.job_id), state));
         }
         for job in expired {

@@ -181,6 +181,7 @@ mod tests {
             after_job,
             priority: 0,
             max_queued: 100,
+            is_small: false,
         }
     }
 

@@ -126,11 +126,8 @@ async fn new_name_of_footage_is_shown_by_everything_made_from_it() {
         let request = app.request(Method::PATCH, path).json(&body);
         request.send().await.unwrap()
     };
-    let answer = rename(
-        &results.footage,
-        json!({"name": "../zebra\u{202e} finch.mp4"}),
-    )
-    .await;
+    let name = json!({"name": "../zebra\u{202e} finch.mp4"});
+    let answer = rename(&results.footage, name).await;
     let footage = json_of(answer, StatusCode::OK).await;
     assert_eq!(footage["name"], "zebra finch.mp4");
     for path in [

@@ -127,9 +127,8 @@ async fn unused_resources_are_deleted_unless_something_that_stays_needs_them() {
     let with_flock = Family::unused(&app, 1).await;
     with_flock.pin(&app, Flock).await;
     let with_fish = Family::unused(&app, 2).await;
-    with_fish
-        .record_use(&app, Fish, now_ms() - DAY_MS / 2)
-        .await;
+    let recently_ms = now_ms() - DAY_MS / 2;
+    with_fish.record_use(&app, Fish, recently_ms).await;
     let with_library = Family::unused(&app, 3).await;
     with_library.pin(&app, Library).await;
     let with_footage = Family::unused(&app, 4).await;

@@ -2,7 +2,7 @@
 //! have changed the data gets a fresh copy of the folder afterwards, so that every input meets the same data.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use axum::Router;
@@ -12,12 +12,10 @@ use clap::Parser;
 use flockreel::api::{self, AppState};
 use flockreel::config::Config;
 use flockreel::jobs::worker::{Step, Worker};
-use flockreel::jobs::{Context, IdSequence, Product, analysis, fish, flock};
+use flockreel::jobs::{Context, IdSequence, analysis, fish, flock};
 use flockreel::store::footage::{Footage, POSTER, VIDEO};
-use flockreel::store::jobs::Kind;
-use flockreel::store::jobs::finish::Source;
 use flockreel::store::owners::{Account, Owner};
-use flockreel_core::ids::{FootageId, LibraryId};
+use flockreel_core::ids::FootageId;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
@@ -189,7 +187,7 @@ async fn fill(context: &Context) -> Ids {
         .enqueue(&of_library, Some(job), &account, &mut ids)
         .await;
     let (_, fish) = queued.expect("a job");
-    work(context, footage, library_id).await;
+    work(context).await;
     let pending = context.enqueue(&of_library, None, &account, &mut ids).await;
     pending.expect("a job");
     [
@@ -227,38 +225,49 @@ async fn store_film(context: &Context) -> Uuid {
         fps: 25.0,
         n_frames_hint: 16,
         sample: false,
+        pinned: false,
+        used_ms: 0,
         created_ms: 0,
     };
     let id = footage.id;
     store
-        .add_footage(footage, draft, &files)
+        .add_footage(footage, draft, &files, None)
         .await
         .expect("stored footage");
     id
 }
 
-/// Ends the queued jobs. The library is the small library of all targets.
-async fn work(context: &Context, footage: Uuid, library: LibraryId) {
-    let worker = Worker::new(context.clone());
-    for _ in 0..3 {
-        let step = worker.step_by(move |lease, attempt| {
-            let (source_id, summary) = match lease.kind {
-                Kind::Analysis => (footage, library_summary()),
-                Kind::Flock => (library.0, flock_summary()),
-                Kind::Fish => (library.0, fish_summary()),
-                Kind::Sample => unreachable!("nothing queues a sample"),
-            };
-            match lease.kind {
-                Kind::Analysis => super::super::library::write_small(attempt.folder()),
-                _ => fs::write(attempt.folder().join("video.mp4"), b"a film")?,
-            }
-            Ok(Product {
-                source: Source::Resource(source_id),
-                params: "{}".to_owned(),
-                summary: summary.to_string(),
-            })
+/// Ends the queued jobs. The library is the small library of all targets. A shell script in place of
+/// `flockreel attempt` copies the files of each result.
+async fn work(context: &Context) {
+    let blobs = context.store.blobs();
+    for (kind, summary) in [
+        ("library", library_summary()),
+        ("flock", flock_summary()),
+        ("fish", fish_summary()),
+    ] {
+        let made = blobs.draft(kind).expect("a draft");
+        match kind {
+            "library" => super::super::library::write_small(made.path()),
+            _ => fs::write(made.path().join("video.mp4"), b"a film").expect("room"),
+        }
+        let files = blobs.seal(&made).expect("sealed files");
+        let files: Vec<Value> = files
+            .iter()
+            .map(|file| json!({"name": file.name, "size_bytes": file.size_bytes, "sha256": file.sha256}))
+            .collect();
+        let product = json!({"film": null, "params": "{}", "summary": summary.to_string()});
+        let end = json!({"end": {"done": [product, files]}});
+        let script = format!(
+            "for folder; do :; done; read -r order; cp '{}'/* \"$folder\"; printf '%s\\n' '{end}'",
+            made.path().display()
+        );
+        let arguments = ["-c", &script, "sh"].map(Into::into).to_vec();
+        let worker = Worker::new(Context {
+            attempt_program: (PathBuf::from("/bin/sh"), arguments),
+            ..context.clone()
         });
-        let step = step.await.expect("a step");
+        let step = worker.step().await.expect("a step");
         assert!(matches!(step, Step::Done(_)), "the job did not end");
     }
 }
