@@ -2,6 +2,7 @@
 // @ts-check
 import { unreachable } from "./api.js";
 import { byId, element } from "./element.js";
+import { placeModule } from "./place-module.js";
 import { showProblem } from "../parts/problem.js";
 import { say } from "./words.js";
 
@@ -102,7 +103,7 @@ async function show({ focus = false, scroll = 0 }) {
     const id = decodeURIComponent(route?.pattern.exec(location.pathname)?.[1] ?? "");
     const name = route?.place ?? "missing";
     /** @type {[Place, ...unknown[]]} */
-    const [place] = await Promise.all([import(`../places/${name}.js`), ...(PLAIN.includes(name) ? [] : STYLES.map((sheet) => styled(`/static/css/${sheet}.css`)))]);
+    const [place] = await Promise.all([placeModule(name, life), ...(PLAIN.includes(name) ? [] : STYLES.map((sheet) => styled(`/static/css/${sheet}.css`)))]);
     if (life.aborted) return;
     root.replaceChildren();
     root.className = `place place-${name}`;
