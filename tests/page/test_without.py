@@ -167,6 +167,16 @@ def test_a_film_is_called_deleted_only_if_the_service_says_so(page, filled_servi
     expect(place).to_contain_text(say(page, "job.analysis", film=say(page, "film.deleted")))
 
 
+def test_a_place_that_could_not_be_loaded_is_there_once_the_service_is(page, filled_service):
+    page.goto(filled_service)
+    heading(page).wait_for()
+    page.route("**/static/js/places/films.js", lambda route: route.abort(), times=1)
+    page.route("**/healthz", lambda route: route.abort(), times=1)
+    page.get_by_role("link", name=say(page, "nav.films"), exact=True).first.click()
+    expect(page.get_by_role("main")).to_contain_text(say(page, "problem.unreachable"))
+    expect(heading(page)).to_have_text(say(page, "films.title"))
+
+
 def test_a_job_that_waits_tells_how_many_come_before_it(page, filled_service):
     job = get(f"{filled_service}/v1/jobs")["items"][0]
     waiting = [{**job, "id": f"{k:08x}-0000-7000-8000-000000000000", "state": "queued", "started_at": None, "finished_at": None, "progress": 0} for k in (3, 2)]

@@ -1,7 +1,7 @@
 // Places and their addresses. Links inside the page change the place without loading the page again.
 // @ts-check
-import { unreachable } from "./api.js";
 import { byId, element } from "./element.js";
+import { placeModule } from "./place-module.js";
 import { showProblem } from "../parts/problem.js";
 import { say } from "./words.js";
 
@@ -102,7 +102,7 @@ async function show({ focus = false, scroll = 0 }) {
     const id = decodeURIComponent(route?.pattern.exec(location.pathname)?.[1] ?? "");
     const name = route?.place ?? "missing";
     /** @type {[Place, ...unknown[]]} */
-    const [place] = await Promise.all([import(`../places/${name}.js`), ...(PLAIN.includes(name) ? [] : STYLES.map((sheet) => styled(`/static/css/${sheet}.css`)))]);
+    const [place] = await Promise.all([placeModule(name, life, (problem) => fail(root, problem)), ...(PLAIN.includes(name) ? [] : STYLES.map((sheet) => styled(`/static/css/${sheet}.css`)))]);
     if (life.aborted) return;
     root.replaceChildren();
     root.className = `place place-${name}`;
@@ -126,7 +126,6 @@ async function fail(root, problem) {
   const missing = isMissing && !root.querySelector("h1") && await import("../places/missing.js").catch(() => null);
   if (missing) return missing.show(root);
   setTitle(say("problem.title"));
-  // Without a connection, the modules of a place cannot be loaded.
-  showProblem(root, problem instanceof TypeError && !navigator.onLine ? unreachable() : problem);
+  showProblem(root, problem);
   root.prepend(element("h1", { tabIndex: -1 }, say("problem.title")));
 }
