@@ -29,6 +29,14 @@ pub struct Config {
     /// Requests per second allowed to each token owner, with bursts of 4 times as many; 0 sets no limit.
     #[arg(long, env = "FLOCKREEL_RATE", default_value_t = 200, value_name = "N")]
     pub rate: u32,
+    /// Requests of one token owner that may be open at once, including event streams; 0 sets no limit.
+    #[arg(
+        long,
+        env = "FLOCKREEL_MAX_OPEN_REQUESTS",
+        default_value_t = 256,
+        value_name = "N"
+    )]
+    pub max_open_requests: u32,
     /// Maximum number of jobs of all users that may be queued or running at once.
     #[arg(long, env = "FLOCKREEL_MAX_QUEUED", default_value_t = 10_000, value_name = "N",
         value_parser = clap::value_parser!(i64).range(0..))]

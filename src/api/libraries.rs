@@ -8,7 +8,6 @@ use tokio_util::io::ReaderStream;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::AppState;
 use super::download::names::{saved_as, stem};
 use super::download::{Download, Files, built, find as find_file, matches};
 use super::extract::{Access, Conditions, FileOf, Id};
@@ -144,7 +143,7 @@ pub(super) async fn get_library_file(
 ) -> Answer {
     if name == DISTANCE_ARRAY {
         let library = access.find::<Library>(id).await?;
-        return distance_array(&access.state, &library, &conditions).await;
+        return distance_array(&access, &library, &conditions).await;
     }
     let (name, media_type) = find_file(FILES, &name)?;
     let library = access.find::<Library>(id).await?;
@@ -163,7 +162,7 @@ fn saved_name(library: &Library, name: &str) -> String {
 }
 
 /// Returns distance.npy. The library's files never change, so clients may cache the result forever.
-async fn distance_array(state: &AppState, library: &Library, conditions: &Conditions) -> Answer {
+async fn distance_array(access: &Access, library: &Library, conditions: &Conditions) -> Answer {
     let etag = format!("\"{}-{DISTANCE_ARRAY}\"", library.id);
     let known = conditions.headers.get(header::IF_NONE_MATCH);
     let answer = Response::builder().header(header::ETAG, &etag).header(
@@ -174,7 +173,8 @@ async fn distance_array(state: &AppState, library: &Library, conditions: &Condit
     if known.is_some_and(|tags| matches(tags, &etag)) {
         return built(answer.status(StatusCode::NOT_MODIFIED).body(Body::empty()));
     }
-    let file = synchronous::distance_file(&state.context, library).await?;
+    let (context, owner) = (&access.state.context, &access.caller.account.owner);
+    let file = synchronous::distance_file(context, owner, library).await?;
     let n_bytes = file.metadata().map_err(jobs::Error::Io)?.len();
     let file = ReaderStream::new(tokio::fs::File::from_std(file));
     built(

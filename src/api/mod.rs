@@ -45,8 +45,9 @@ pub use monitoring::metrics::{metrics_router, worker_metrics_router};
 pub use problem::Problem;
 
 use download::compression;
+use download::if_match::check_if_match;
 
-use access::{HostNames, Rates, authenticate, guard, session};
+use access::{HostNames, OpenRequests, Rates, authenticate, guard, session};
 use monitoring::metrics::Metrics;
 use monitoring::observe::{Requests, observe};
 use monitoring::{health, metrics};
@@ -78,6 +79,8 @@ pub struct Shared {
     pub media_tool: Result<media::SandboxStatus, String>,
     /// Rate limits of owners and addresses.
     rates: Rates,
+    /// Open requests of owners and addresses.
+    open_requests: OpenRequests,
     /// Counters of HTTP requests.
     requests: Requests,
     /// All metrics of the service.
@@ -113,6 +116,7 @@ impl AppState {
             metrics: Metrics::new(&context.meters, &requests),
             requests,
             rates: Rates::new(config.rate),
+            open_requests: OpenRequests::new(config.max_open_requests),
             config,
             context,
             media_tool: tool.map_err(|error| error.to_string()),
@@ -139,6 +143,7 @@ pub fn router(state: AppState) -> Router {
         .fallback(page::get_missing)
         .method_not_allowed_fallback(|| async { Problem::from(Code::MethodNotAllowed) })
         .with_state(state.clone())
+        .layer(middleware::from_fn(check_if_match))
         .layer(middleware::from_fn_with_state(
             state.clone(),
             idempotency::run_once,

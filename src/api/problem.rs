@@ -226,7 +226,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::RangeNotSatisfiable => StatusCode::RANGE_NOT_SATISFIABLE,
         // Status 460 comes from the tus protocol and has no name in HTTP.
         Code::ChecksumMismatch => StatusCode::from_u16(460).unwrap_or(StatusCode::BAD_REQUEST),
-        Code::TusVersionNotSupported => StatusCode::PRECONDITION_FAILED,
+        Code::TusVersionNotSupported | Code::PreconditionFailed => StatusCode::PRECONDITION_FAILED,
         Code::AlreadyFinished
         | Code::AlreadyStored
         | Code::RequestInProgress

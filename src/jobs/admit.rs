@@ -31,7 +31,7 @@ pub struct ReceivedFiles {
 /// Checks the files and stores them. Returns the existing footage if the owner has already stored the same
 /// files. Waits for a permit of `upload_checks`; fails with [`Error::Busy`] if none becomes free.
 pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, Error> {
-    let permit = context.upload_checks.acquire().await?;
+    let permit = context.upload_checks.acquire(&received.owner).await?;
     let store = context.store.clone();
     let (received, format, poster) = tokio::task::spawn_blocking(move || {
         let _permit = permit;

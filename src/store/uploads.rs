@@ -72,6 +72,8 @@ impl Store {
     pub async fn create_upload(&self, upload: &Upload) -> Result<(), Error> {
         self.reserve.require().await?;
         File::create_new(self.upload_path(upload.id)).await?;
+        // Otherwise a power loss could take the file's name, and with it bytes that were confirmed.
+        File::open(self.blobs.uploads()).await?.sync_all().await?;
         let sql = "insert into uploads (id, name, size_bytes, expires_ms, owner) \
                    values ($1, $2, $3, $4, $5)";
         let insert = sql::query(sql)

@@ -116,8 +116,9 @@ def build():
 def run(programs, test, off):
     """Returns why a test fails, or None if it passes."""
     kind, path = test.split(" ")
-    if kind == "contract":
-        command = [ROOT / "target/contract-venv/bin/python", "-B", ROOT / path, PLACE / "target/debug/flockreel"]
+    if kind in ("contract", "stress"):
+        python = ROOT / "target/contract-venv/bin/python" if kind == "contract" else sys.executable
+        command = [python, "-B", ROOT / path, PLACE / "target/debug/flockreel"]
     else:
         program = programs["it" if kind == "scale" else kind]
         command = [program, "--exact", path, "--nocapture"] + (["--ignored"] if kind == "scale" else [])
@@ -126,7 +127,7 @@ def run(programs, test, off):
         done = subprocess.run(command, cwd=SOURCES, env=environment, capture_output=True, text=True, errors="replace", timeout=LONGEST_S)
     except subprocess.TimeoutExpired:
         return f"did not end in {LONGEST_S} s"
-    if kind != "contract" and "running 1 test" not in done.stdout:
+    if kind not in ("contract", "stress") and "running 1 test" not in done.stdout:
         sys.exit(f"guards: the test does not exist: {test}")
     if done.returncode == 0:
         return None

@@ -161,7 +161,8 @@ def test_a_film_is_called_deleted_only_if_the_service_says_so(page, filled_servi
     expect(place).to_contain_text(say(page, "job.analysis", film=say(page, "film.unnamed")))
     expect(place).not_to_contain_text(say(page, "film.deleted"))
     page.unroute(broken)
-    page.route("**/v1/footage?*", lambda route: route.fulfill(json={"items": [], "next_cursor": None}))
+    younger = {"id": "ffffffff-ffff-7fff-bfff-ffffffffffff", "name": "younger.mp4"}
+    page.route("**/v1/footage?*", lambda route: route.fulfill(json={"items": [younger], "next_cursor": None}))
     page.reload()
     expect(place).to_contain_text(say(page, "job.analysis", film=say(page, "film.deleted")))
 

@@ -148,6 +148,8 @@ codes! {
         "Send the body again. Uploads through `/v1/uploads` continue where they were interrupted."
     RangeNotSatisfiable "range_not_satisfiable" "The requested range begins after the end of the file."
         "`Content-Range` in the response contains the size of the file."
+    PreconditionFailed "precondition_failed" "`If-Match` names another version than the current one."
+        "Get the resource again, and repeat the request with its `ETag`, or without `If-Match`. Writes accept only `*`."
     AlreadyFinished "already_finished" "The job has ended and cannot be cancelled."
         "No action is needed. Delete the result if it is not needed."
     IdempotencyKeyReused "idempotency_key_reused" "The Idempotency-Key was already used with another body."

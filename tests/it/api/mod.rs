@@ -8,6 +8,7 @@ mod deletes;
 mod docs;
 mod downloads;
 mod events;
+mod fairness;
 mod footage;
 mod idempotency;
 mod jobs;
