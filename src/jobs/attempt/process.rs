@@ -191,14 +191,16 @@ async fn follow(
     let log = tokio::spawn(relay_log(Receiver::from_owned_fd(stderr.into())?).in_current_span());
     let mut messages = pin!(read(Receiver::from_owned_fd(stdout.into())?, listener));
     let end = tokio::select! {
-        end = &mut messages => end,
-        () = listener.stopped() => timeout(grace, &mut messages).await.ok().flatten(),
+        end = &mut messages => Ok(end),
+        () = listener.stopped() => timeout(grace, &mut messages).await,
     };
     drop(feeding);
-    let status = spawn_blocking(move || group.end_within(grace)).await;
+    // A child that did not end in time has no more.
+    let patience = end.as_ref().map_or(Duration::ZERO, |_| grace);
+    let status = spawn_blocking(move || group.end_within(patience)).await;
     let status = status.map_err(io::Error::other)??;
     let is_out_of_memory = timeout(grace, log).await;
-    match end {
+    match end.ok().flatten() {
         Some(end) => Ok(end),
         None if listener.is_cancelled() => Err(Error::Cancelled),
         None => Err(verdict(status, matches!(is_out_of_memory, Ok(Ok(true))))),
