@@ -250,7 +250,7 @@ async fn usage_tells_number_and_size_of_the_things_of_the_caller() {
 
 #[tokio::test]
 async fn announced_uploads_may_not_exceed_the_free_disk() {
-    let disk = rustix::fs::statvfs(&std::env::temp_dir()).unwrap();
+    let disk = rustix::fs::statvfs(std::env::temp_dir()).unwrap();
     let n_free = disk.f_bavail * disk.f_frsize;
     // Two of these uploads leave the reserve free, with room for what other programs write and delete meanwhile.
     let n_bytes = n_free / 8;
