@@ -63,6 +63,9 @@ use crate::store::space::SpaceLimits;
 use crate::{media, store};
 use flockreel_core::code::Code;
 
+/// Maximum number of open resumable uploads of one owner, even if each is small. Free choice.
+const MAX_OWNER_UPLOADS: i64 = 1000;
+
 /// Largest JSON body, bytes. Free choice.
 const MAX_JSON_BYTES: usize = 1 << 20;
 
@@ -112,6 +115,7 @@ impl AppState {
         let store = Store::open(config.storage.clone()).await?;
         let store = store.with_space_limits(SpaceLimits {
             max_owner_bytes: config.owner_space.max_owner_bytes,
+            max_owner_uploads: MAX_OWNER_UPLOADS,
             disk_reserve_bytes: config.disk_reserve_bytes,
         });
         let mut context = Context::for_jobs(store, &config.jobs);

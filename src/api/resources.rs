@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use uuid::Uuid;
 
+use super::AppState;
 use super::download::Files;
 use super::extract::Access;
 use super::jobs::absent_result;
@@ -13,7 +14,7 @@ use super::paging::{Listing, Page};
 use super::problem::{JsonAnswer, Problem};
 use crate::jobs::clock::now_ms;
 use crate::store::BlobFile;
-use crate::store::resources::{Property, Resource, ResourceFilter};
+use crate::store::resources::{Property, Resource, ResourceFilter, ResourceKind};
 use flockreel_core::code::Code;
 
 /// Time for which a recorded use also stands for later ones, milliseconds. Ages are counted in days, so an hour is exact
@@ -182,14 +183,7 @@ impl Access {
         if now_ms - R::used_ms(row) < USE_INTERVAL_MS || !self.state.uses().insert(id) {
             return;
         }
-        let state = self.state.clone();
-        tokio::spawn(async move {
-            let recorded = state.context.store.record_use(R::KIND, id, now_ms);
-            if let Err(error) = recorded.await {
-                tracing::debug!(%error, resource.id = %id, "the use of a resource was not recorded");
-            }
-            state.uses().remove(&id);
-        });
+        tokio::spawn(record_use(self.state.clone(), R::KIND, id, now_ms));
     }
 
     /// Deletes a resource and returns 204. Fails with `not_found` if it was deleted in the meantime.
@@ -201,4 +195,12 @@ impl Access {
             Err(Problem::not_found())
         }
     }
+}
+
+async fn record_use(state: AppState, kind: ResourceKind, id: Uuid, now_ms: i64) {
+    let recorded = state.context.store.record_use(kind, id, now_ms);
+    if let Err(error) = recorded.await {
+        tracing::debug!(%error, resource.id = %id, "the use of a resource was not recorded");
+    }
+    state.uses().remove(&id);
 }

@@ -28,9 +28,9 @@ impl Store {
     ) -> Result<bool, Error> {
         let delete = || async {
             let mut transaction = self.writer.begin().await?;
+            // No job that uses the resource is queued meanwhile, and deletions do not wait for each other in a circle.
+            transaction.lock(QUEUE_LOCK).await?;
             if let Some((sql, parameter)) = condition {
-                // No job that uses the resource is queued meanwhile.
-                transaction.lock(QUEUE_LOCK).await?;
                 let select = sql::query_scalar(sql.to_owned()).bind(parameter).bind(id);
                 let found: Option<Uuid> = select.fetch_optional(&mut transaction).await?;
                 if found.is_none() {

@@ -73,6 +73,14 @@ pub enum Error {
         /// The maximum per owner, bytes.
         max_bytes: u64,
     },
+    /// The owner has begun too many resumable uploads.
+    #[error(
+        "{max_uploads} resumable uploads are open, the most that an owner may have: finish or cancel one"
+    )]
+    TooManyUploads {
+        /// The maximum per owner.
+        max_uploads: i64,
+    },
     /// The queue has reached the maximum number of queued and running jobs of all owners.
     #[error(
         "the queue is full ({max_queued} queued and running jobs): try again when some have ended"
@@ -100,7 +108,7 @@ impl Error {
             Error::AlreadyStored => Code::AlreadyStored,
             Error::QuotaExceeded { .. } => Code::QuotaExceeded,
             Error::QueueFull { .. } => Code::QueueFull,
-            Error::OwnerStorageFull { .. } => Code::OwnerStorageFull,
+            Error::OwnerStorageFull { .. } | Error::TooManyUploads { .. } => Code::OwnerStorageFull,
             Error::Io(error) if is_disk_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Io(error)) if is_disk_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Database(error)) if is_database_full(error.as_ref()) => {

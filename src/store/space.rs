@@ -24,6 +24,8 @@ const DISK_LOCK: &str = "disk";
 pub struct SpaceLimits {
     /// Maximum total size of the files and open uploads of one owner, bytes; 0 sets no limit.
     pub max_owner_bytes: u64,
+    /// Maximum number of open resumable uploads of one owner; 0 sets no limit.
+    pub max_owner_uploads: i64,
     /// Disk space that uploads leave free, bytes.
     pub disk_reserve_bytes: u64,
 }
@@ -123,8 +125,8 @@ impl Store {
         if self.space.max_owner_bytes().is_none() {
             return Ok(());
         }
-        let used_bytes = owner_bytes(owner, None).fetch_one(&self.reader).await?;
-        self.space.check_owner(used_bytes, 1)
+        let used_bytes: i64 = owner_bytes(owner, None).fetch_one(&self.reader).await?;
+        self.space.check_owner(used_bytes.unsigned_abs(), 1)
     }
 
     /// Fails with `storage_full` if `n_bytes` more would use the reserve of the disk.
@@ -182,28 +184,40 @@ impl Store {
         if self.space.max_owner_bytes().is_none() {
             return Ok(());
         }
-        transaction.lock(&format!("space of {}", owner.0)).await?;
-        let used_bytes = owner_bytes(owner, instead_of)
+        lock_space(transaction, owner).await?;
+        let used_bytes: i64 = owner_bytes(owner, instead_of)
             .fetch_one(transaction)
             .await?;
-        self.space.check_owner(used_bytes, n_bytes.unsigned_abs())
+        let (used_bytes, n_bytes) = (used_bytes.unsigned_abs(), n_bytes.unsigned_abs());
+        self.space.check_owner(used_bytes, n_bytes)
     }
 
-    /// Like [`Store::require_owner_space`], for a new resumable upload: bodies of requests count too, and all announced
-    /// bytes must fit on the disk.
+    /// Fails with [`Error::OwnerStorageFull`] or [`Error::TooManyUploads`] if the owner cannot begin a resumable upload of
+    /// `n_bytes`, and with `storage_full` if the disk has no space for all announced bytes. The result holds until the
+    /// end of the transaction.
     pub(super) async fn require_upload_space(
         &self,
         transaction: &mut Transaction,
         owner: &Owner,
-        n_bytes: i64,
+        n_bytes: u64,
     ) -> Result<(), Error> {
         transaction.lock(DISK_LOCK).await?;
-        let incoming_bytes = self.space.announced_bytes(owner).cast_signed();
-        let all_bytes = n_bytes.saturating_add(incoming_bytes);
-        self.require_owner_space(transaction, owner, all_bytes, None)
+        lock_space(transaction, owner).await?;
+        let used_bytes: i64 = owner_bytes(owner, None)
+            .fetch_one(&mut *transaction)
             .await?;
+        let incoming_bytes = self.space.announced_bytes(owner);
+        self.space
+            .check_owner(used_bytes.unsigned_abs() + incoming_bytes, n_bytes)?;
+        let sql = "select count(*) from uploads where owner = $1 and footage_id is null";
+        let count = sql::query_scalar(sql).bind(owner);
+        let n_uploads: i64 = count.fetch_one(&mut *transaction).await?;
+        let max_uploads = self.space.limits.max_owner_uploads;
+        if max_uploads > 0 && n_uploads >= max_uploads {
+            return Err(Error::TooManyUploads { max_uploads });
+        }
         let missing_bytes = self.missing_here(missing().fetch_all(transaction).await?);
-        self.check_disk(missing_bytes.saturating_add(n_bytes.unsigned_abs()))
+        self.check_disk(missing_bytes.saturating_add(n_bytes))
     }
 
     /// Returns the bytes that uploads to this machine have announced and not sent yet. `uploads` are all open ones.
@@ -230,12 +244,12 @@ impl Space {
         Some(self.limits.max_owner_bytes).filter(|max_bytes| *max_bytes > 0)
     }
 
-    fn check_owner(&self, used_bytes: i64, n_bytes: u64) -> Result<(), Error> {
+    fn check_owner(&self, used_bytes: u64, n_bytes: u64) -> Result<(), Error> {
         match self.max_owner_bytes() {
-            Some(max_bytes) if used_bytes.unsigned_abs().saturating_add(n_bytes) > max_bytes => {
+            Some(max_bytes) if used_bytes.saturating_add(n_bytes) > max_bytes => {
                 self.refusals.by_owner.fetch_add(1, Ordering::Relaxed);
                 Err(Error::OwnerStorageFull {
-                    used_bytes: used_bytes.unsigned_abs(),
+                    used_bytes,
                     n_bytes,
                     max_bytes,
                 })
@@ -263,17 +277,17 @@ impl Announced {
     async fn grow(&mut self, n_bytes: u64, n_missing: u64) -> Result<(), Error> {
         let store = &self.store;
         let used_bytes = owner_bytes(&self.owner, None).fetch_one(&store.reader);
-        let used_bytes = used_bytes.await?;
+        let used_bytes: i64 = used_bytes.await?;
         let missing_bytes = store.missing_here(missing().fetch_all(&store.reader).await?);
         store.check_disk(missing_bytes.saturating_add(n_missing))?;
         // Counted and added under one lock, so that simultaneous bodies do not exceed the limit.
         let mut incoming = store.space.incoming();
         let announced = incoming.announced_bytes.entry(self.owner.clone());
         let announced_bytes = announced.or_default();
-        let all_bytes = announced_bytes.saturating_add(n_bytes);
-        store.space.check_owner(used_bytes, all_bytes)?;
-        *announced_bytes = all_bytes;
-        incoming.missing_bytes = incoming.missing_bytes.saturating_add(n_missing);
+        let used_bytes = used_bytes.unsigned_abs() + *announced_bytes;
+        store.space.check_owner(used_bytes, n_bytes)?;
+        *announced_bytes += n_bytes;
+        incoming.missing_bytes += n_missing;
         drop(incoming);
         self.n_bytes += n_bytes;
         self.n_missing += n_missing;
@@ -304,6 +318,11 @@ impl Counted {
     }
 }
 
+/// Takes the lock of transactions that compare the bytes of this owner with their limit.
+async fn lock_space(transaction: &mut Transaction, owner: &Owner) -> Result<(), sqlx::Error> {
+    transaction.lock(&format!("space of {}", owner.0)).await
+}
+
 /// Returns the query for the bytes of an owner: stored files, and open uploads except `but`.
 fn owner_bytes(owner: &Owner, but: Option<Uuid>) -> sql::ScalarQuery {
     let stored = ResourceKind::ALL.map(|kind| {
@@ -321,4 +340,50 @@ fn owner_bytes(owner: &Owner, but: Option<Uuid>) -> sql::ScalarQuery {
 /// Returns the query for the bytes that each open upload has announced and not sent yet.
 fn missing() -> sql::Query {
     sql::query("select id, size_bytes - offset_bytes from uploads where footage_id is null")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::fresh;
+    use crate::store::uploads::Upload;
+
+    fn upload() -> Upload {
+        Upload {
+            id: Uuid::now_v7(),
+            owner: Owner::local(),
+            name: String::new(),
+            size_bytes: 1,
+            offset_bytes: 0,
+            footage_id: None,
+            expires_ms: i64::MAX,
+        }
+    }
+
+    #[tokio::test]
+    async fn owner_may_have_a_limited_number_of_open_uploads() {
+        let data = tempfile::tempdir().unwrap();
+        let store = fresh::open(data.path()).await;
+        let store = store.with_space_limits(SpaceLimits {
+            max_owner_uploads: 2,
+            ..SpaceLimits::default()
+        });
+        let (first, second) = (upload(), upload());
+        for upload in [&first, &second] {
+            store.create_upload(upload).await.unwrap();
+        }
+        let refused = store.create_upload(&upload()).await.unwrap_err();
+        assert!(matches!(refused, Error::TooManyUploads { max_uploads: 2 }));
+        store
+            .create_upload(&Upload {
+                owner: Owner("other".into()),
+                ..upload()
+            })
+            .await
+            .unwrap();
+        store.finish_upload(&first, Uuid::now_v7()).await.unwrap();
+        store.create_upload(&upload()).await.unwrap();
+        let files = std::fs::read_dir(data.path().join("uploads")).unwrap();
+        assert_eq!(files.count(), 3, "a refused upload left its file");
+    }
 }

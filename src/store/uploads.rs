@@ -68,8 +68,8 @@ pub struct UploadFile {
 }
 
 impl Store {
-    /// Adds an upload that has no bytes yet. Fails with [`Error::OwnerStorageFull`] or `storage_full` if its announced
-    /// size does not fit.
+    /// Adds an upload that has no bytes yet. Fails with [`Error::OwnerStorageFull`], [`Error::TooManyUploads`] or
+    /// `storage_full` if its announced size does not fit.
     pub async fn create_upload(&self, upload: &Upload) -> Result<(), Error> {
         self.reserve.require().await?;
         File::create_new(self.upload_path(upload.id)).await?;
@@ -84,7 +84,8 @@ impl Store {
 
     async fn insert_upload(&self, upload: &Upload) -> Result<(), Error> {
         let mut transaction = self.writer.begin().await?;
-        self.require_upload_space(&mut transaction, &upload.owner, upload.size_bytes)
+        let (owner, n_bytes) = (&upload.owner, upload.size_bytes.unsigned_abs());
+        self.require_upload_space(&mut transaction, owner, n_bytes)
             .await?;
         let sql = "insert into uploads (id, name, size_bytes, expires_ms, owner) \
                    values ($1, $2, $3, $4, $5)";

@@ -10,6 +10,7 @@ use flockreel::jobs::supervisor::Supervisor;
 use flockreel::store::idempotency::{ANSWER_LIFETIME_MS, Answer, Begun, Scope};
 use flockreel::store::owners::{Owner, OwnerFilter};
 use flockreel::store::resources::{Property, ResourceKind};
+use flockreel::store::upkeep::retention::Retired;
 use flockreel::store::uploads::Upload;
 use uuid::Uuid;
 
@@ -175,14 +176,19 @@ async fn unused_resources_are_deleted_unless_something_that_stays_needs_them() {
     ] {
         assert_eq!(family.left(&app).await, left);
     }
+    assert_counted(&app, &expected).await;
+    app.assert_sound().await;
+}
+
+/// Asserts that the metrics count these deletions.
+async fn assert_counted(app: &TestApp, retired: &Retired) {
     let metrics = app.get("/metrics").send().await.unwrap();
     let metrics = metrics.text().await.unwrap();
-    for (kind, amount) in expected.resources {
+    for (kind, amount) in &retired.resources {
         let (noun, n) = (kind.plural(), amount.n);
         let line = format!("flockreel_retention_deletes_total{{noun=\"{noun}\"}} {n}\n");
         assert!(metrics.contains(&line), "{line}{metrics}");
     }
-    app.assert_sound().await;
 }
 
 /// Returns the recorded use of a footage or library.
