@@ -223,7 +223,6 @@ mod tests {
     use serde_json::Value;
 
     use super::super::{read, write};
-    use super::*;
     use crate::analysis::Params;
     use crate::flock::synthetic;
     use crate::formats::library_json::FootageSummary;
