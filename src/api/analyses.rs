@@ -2,12 +2,12 @@
 //!
 //! The request names stored footage, or its body is the video itself, which is then stored first.
 
-use axum::extract::{FromRequest, Query, Request};
+use axum::extract::{FromRequest, Request};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use utoipa::ToSchema;
 
-use super::extract::{Access, Json};
+use super::extract::{Access, Json, Query};
 use super::footage::{Naming, admit};
 use super::jobs::accepted;
 use super::problem::{Answer, Problem, ProblemBody};

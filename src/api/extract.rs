@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 
 use axum::extract::rejection::JsonRejection;
-use axum::extract::{FromRequest, FromRequestParts, Path, Request};
+use axum::extract::{self, FromRequest, FromRequestParts, Path, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, Method};
 use serde::de::DeserializeOwned;
@@ -81,6 +81,35 @@ impl<S: Send + Sync> FromRequestParts<S> for FileOf {
         let path = Path::<(Uuid, String)>::from_request_parts(parts, state).await;
         let path = path.map_err(|_rejection| Problem::not_found());
         path.map(|Path((id, name))| FileOf(id, name))
+    }
+}
+
+/// File name, or path of a file, in the path of the request. A malformed one fails with `not_found`.
+#[derive(Clone, Debug)]
+pub(super) struct FileName(pub String);
+
+impl<S: Send + Sync> FromRequestParts<S> for FileName {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<FileName, Problem> {
+        let path = Path::<String>::from_request_parts(parts, state).await;
+        path.map(|Path(name)| FileName(name))
+            .map_err(|_rejection| Problem::not_found())
+    }
+}
+
+/// Query parameters. Malformed or repeated ones fail with `invalid_params`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Query<T>(pub T);
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for Query<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Query<T>, Problem> {
+        let query = extract::Query::<T>::from_request_parts(parts, state).await;
+        query
+            .map(|extract::Query(parameters)| Query(parameters))
+            .map_err(|error| Problem::new(Code::InvalidParams, error.body_text()))
     }
 }
 

@@ -3,7 +3,7 @@
 //! A refused upload leaves no files. The original video is sent only as an attachment, so a browser never
 //! interprets it (docs/explanation/promises.md, "Nothing served runs as a page").
 
-use axum::extract::{Query, Request};
+use axum::extract::Request;
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -13,7 +13,7 @@ use uuid::Uuid;
 use super::AppState;
 use super::download::names::{saved_as, stem};
 use super::download::{Download, disposition};
-use super::extract::{Access, Conditions, Id, Json};
+use super::extract::{Access, Conditions, Id, Json, Query};
 use super::paging::{Filtered, FootageQuery, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::receive::{label, receive};

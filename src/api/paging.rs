@@ -3,7 +3,7 @@
 //! The cursor is the id of the last item of a page. Items that are added or deleted meanwhile therefore
 //! do not shift the following pages.
 
-use axum::extract::{FromRequestParts, Query};
+use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -11,6 +11,7 @@ use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
 use super::Problem;
+use super::extract::Query;
 use crate::store::resources::ResourceFilter;
 use flockreel_core::code::Code;
 
@@ -130,7 +131,8 @@ impl<S: Send + Sync> FromRequestParts<S> for Paging {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Paging, Problem> {
-        read::<Paging, S>(parts, state).await?.checked()
+        let Query(paging) = Query::<Paging>::from_request_parts(parts, state).await?;
+        paging.checked()
     }
 }
 
@@ -141,7 +143,8 @@ impl<S: Send + Sync, Q: DeserializeOwned + Into<Listing>> FromRequestParts<S> fo
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Filtered<Q>, Problem> {
-        let listing: Listing = read::<Q, S>(parts, state).await?.into();
+        let Query(query) = Query::<Q>::from_request_parts(parts, state).await?;
+        let listing: Listing = query.into();
         listing.paging.checked()?;
         // PostgreSQL refuses this character in a text, and no name has it.
         let name = listing.filter.name_contains.as_deref();
@@ -151,15 +154,6 @@ impl<S: Send + Sync, Q: DeserializeOwned + Into<Listing>> FromRequestParts<S> fo
         }
         Ok(Filtered(listing, std::marker::PhantomData))
     }
-}
-
-async fn read<Q: DeserializeOwned, S: Send + Sync>(
-    parts: &mut Parts,
-    state: &S,
-) -> Result<Q, Problem> {
-    let query = Query::<Q>::from_request_parts(parts, state).await;
-    let query = query.map_err(|error| Problem::new(Code::InvalidParams, error.body_text()));
-    query.map(|Query(query)| query)
 }
 
 impl From<FootageQuery> for Listing {

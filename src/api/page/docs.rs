@@ -9,7 +9,6 @@ use std::sync::{Arc, LazyLock};
 
 use axum::Router;
 use axum::body::Body;
-use axum::extract::Path;
 use axum::http::{HeaderMap, Response, header};
 use axum::response::{Html, IntoResponse};
 use axum::routing::get;
@@ -17,6 +16,7 @@ use sha2::{Digest, Sha256};
 use utoipa_swagger_ui::Config;
 
 use super::{media_type, tagged};
+use crate::api::extract::FileName;
 use crate::api::problem::status_of;
 use crate::api::{AppState, Problem};
 use crate::store::blobs::hex;
@@ -43,7 +43,7 @@ pub(in crate::api) fn routes() -> Router<AppState> {
         .route("/docs/{file}", get(get_file))
 }
 
-async fn get_file(Path(name): Path<String>, headers: HeaderMap) -> Result<Response<Body>, Problem> {
+async fn get_file(FileName(name): FileName, headers: HeaderMap) -> Result<Response<Body>, Problem> {
     let file = LOADED.iter().find(|file| file.name == name);
     let file = file.ok_or_else(Problem::not_found)?;
     let media_type = [(header::CONTENT_TYPE, media_type(file.name))];

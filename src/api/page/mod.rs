@@ -9,13 +9,13 @@ pub(super) mod openapi; // /openapi.json
 
 use axum::Router;
 use axum::body::Body;
-use axum::extract::Path;
 use axum::http::{HeaderMap, Method, Response, StatusCode, header};
 use axum::response::IntoResponse;
 use axum::routing::get;
 use rust_embed::{EmbeddedFile, RustEmbed};
 
 use crate::api::download::matches;
+use crate::api::extract::FileName;
 use crate::api::{AppState, Problem};
 use crate::store::blobs::hex;
 
@@ -73,7 +73,7 @@ pub(super) async fn get_missing(method: Method, headers: HeaderMap) -> Response<
 }
 
 async fn get_file<Files: RustEmbed>(
-    Path(path): Path<String>,
+    FileName(path): FileName,
     headers: HeaderMap,
 ) -> Result<Response<Body>, Problem> {
     answer::<Files>(&path, &headers)

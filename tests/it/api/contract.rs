@@ -26,6 +26,8 @@ async fn unknown_paths_and_ids_give_not_found() {
         format!("/v1/flocks/{id}/video.mp4"),
         format!("/v1/flocks/{id}/..%2f..%2flock"),
         "/static/..%2fCargo.toml".to_owned(),
+        "/static/%ff".to_owned(),
+        "/docs/%ff".to_owned(),
     ] {
         let answer = app.get(&path).send().await.unwrap();
         assert_eq!(code_of(answer, 404).await, "not_found", "{path}");
@@ -63,6 +65,13 @@ async fn invalid_bodies_give_the_code_of_their_fault() {
         let body = json!({"footage_id": id, "params": params});
         let answer = app.post(path).json(&body).send().await.unwrap();
         assert_eq!(code_of(answer, 422).await, "invalid_params", "{params}");
+    }
+    for path in ["/v1/footage?name=a&name=b", "/v1/analyses?name=a&name=b"] {
+        let request = app
+            .post(path)
+            .header("content-type", "application/octet-stream");
+        let answer = request.body("film").send().await.unwrap();
+        assert_eq!(code_of(answer, 422).await, "invalid_params", "{path}");
     }
     let answer = app.post(path).body("{}").send().await.unwrap();
     assert_eq!(code_of(answer, 415).await, "unsupported_media_type");

@@ -105,6 +105,19 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_stored_and_read_back_exactly() {
+        for kappa in [
+            "0.218446744073709551615",
+            "1.7976931348623157",
+            "2.2250738585072011e-5",
+        ] {
+            let params = analysis(&format!(r#"{{"kappa": {kappa}}}"#)).unwrap();
+            let stored = serde_json::to_string(&params).unwrap();
+            assert_eq!(serde_json::from_str(&stored).ok(), Some(params), "{kappa}");
+        }
+    }
+
+    #[test]
     fn unknown_names_and_values_out_of_range_are_named() {
         let error = |json| analysis(json).unwrap_err().to_string();
         assert_eq!(error(r#"{"preset": "p"}"#), "the preset is unknown: \"p\"");

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use axum::Router;
-use axum::body::Body;
+use axum::body::{Body, to_bytes};
 use axum::http::{HeaderMap, HeaderName, Method, Request, StatusCode, header};
 use clap::Parser;
 use flockreel::api::{self, AppState};
@@ -24,6 +24,9 @@ use uuid::Uuid;
 
 /// The stored film. Nothing decodes it.
 pub(super) const FILM: &[u8] = b"0123456789abcdefghijklmnopqrstuvwxyz, 41 bytes";
+
+/// Largest body of a response, bytes.
+const MAX_BODY_BYTES: usize = 8 << 20;
 
 /// Words in requests, and the ids for which they stand.
 type Ids = [(&'static str, Uuid); 6];
@@ -96,17 +99,18 @@ impl Service {
         })
     }
 
-    /// Sends a request and reads the response. A request that may have changed the data is the last of its service.
+    /// Sends a request and reads the response. If it has changed the data, the next request meets other data.
     pub(super) fn send(&mut self, request: Request<Body>) -> Reply {
         let is_write = !request.method().is_safe();
+        let is_stored = request.headers().contains_key("idempotency-key");
         let reply = self.send_keeping(request);
-        if is_write {
+        if is_write && (reply.status.is_success() || is_stored) {
             self.ready = None;
         }
         reply
     }
 
-    /// Like [`Service::send`], but the next request meets the same data.
+    /// Like [`Service::send`], but the data stay changed.
     pub(super) fn send_keeping(&mut self, mut request: Request<Body>) -> Reply {
         let host = header::HeaderValue::from_static("localhost");
         request.headers_mut().entry(header::HOST).or_insert(host);
@@ -115,10 +119,16 @@ impl Service {
         let reply = self.runtime.block_on(async {
             let answered = router.clone().oneshot(request).await;
             let (head, body) = answered.expect("the router is infallible").into_parts();
+            // Streams of events never end.
+            let kind = head.headers.get(header::CONTENT_TYPE);
+            let body = match kind.is_some_and(|kind| kind == "text/event-stream") {
+                true => Vec::new(),
+                false => to_bytes(body, MAX_BODY_BYTES).await.expect("a body").into(),
+            };
             Reply {
                 status: head.status,
                 headers: head.headers,
-                body: super::read(body).await,
+                body,
                 is_head,
             }
         });
