@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test soak arm-test docs deny bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test stress-test fuzz soak kills arm-test docs deny bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -16,7 +16,7 @@ help: ## list the commands
 run: build ## install missing packages, build, and start the service with its page
 	$(RELEASE) serve --bind $(BIND) --data $(DATA)
 
-test: unit scale-test truth-test page-test contract-test ## install the packages that tests need, and run all tests
+test: unit scale-test truth-test page-test contract-test stress-test ## install the packages that tests need, and run all tests
 	@echo "all tests passed"
 
 demo: build ## film -> library -> flock.mp4, without a server
@@ -26,7 +26,7 @@ demo: build ## film -> library -> flock.mp4, without a server
 	$(RELEASE) flock target/demo/library -o flock.mp4 --count 20 --frames 400
 	@echo "the flock is in flock.mp4"
 
-check: fmt clippy unit scale-test truth-test page-test contract-test docs deny ## run all checks of CI
+check: fmt clippy unit scale-test truth-test page-test contract-test stress-test docs deny ## run all checks of CI
 	@echo "all checks passed"
 
 fmt: ## check the formatting
@@ -69,8 +69,26 @@ contract-test: target/vendor ## test the API against its OpenAPI document, with 
 	$(CARGO) test --locked --workspace --no-run
 	@scripts/python-tests.sh contract $(DEBUG)
 
-soak: target/vendor ## kill the service two hundred times during uploads
-	FLOCKREEL_KILLS=200 $(CARGO) test --locked --test it -- jobs::uploads
+stress-test: target/vendor ## lose the power, let steps fail, send too much: make stress-test [CASES=all]
+	$(CARGO) test --locked --workspace --no-run
+	@scripts/system-packages.sh test contract-test
+	python3 -B tests/stress/power_loss.py $(DEBUG)
+	python3 -B tests/stress/time_jumps.py $(DEBUG)
+	python3 -B tests/stress/overload.py $(DEBUG)
+	python3 -B tests/stress/failure_steps.py $(DEBUG) $(if $(filter all,$(CASES)),,--cases $(or $(CASES),16))
+
+MINUTES ?= 60
+soak: build target/bench-venv/ready ## run the service with good and hostile clients for an hour: make soak [MINUTES=60]
+	python3 -B tests/stress/soak.py $(RELEASE) --minutes $(MINUTES) --result bench/results/soak.json
+	$(BENCH) bench/measurements.py
+
+kills: target/vendor ## kill the service two hundred times on each engine; keep the disk full for ten minutes
+	FLOCKREEL_KILLS=200 $(CARGO) test --locked --test it -- jobs::uploads jobs::kills
+	FLOCKREEL_KILLS=200 scripts/with-servers.sh $(CARGO) test --locked --test it -- jobs::uploads jobs::kills
+	FLOCKREEL_FULL_SECONDS=60 $(CARGO) test --locked --test it -- jobs::full_disk::every_request
+
+fuzz: target/vendor ## run every fuzz target for FUZZ_SECONDS (60): make fuzz [TARGETS="plan poses"]
+	CARGO="$(CARGO)" scripts/fuzz.sh $(TARGETS)
 
 # Not part of `check`, because it takes half an hour. ARM_TESTS=analysis::distance selects the kernels only.
 ARM = aarch64-unknown-linux-gnu

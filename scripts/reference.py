@@ -147,11 +147,11 @@ def values(schema, items):
         return f"list of {values(items, {})}{most}".replace("object", "objects")
     if pattern := schema.get("pattern"):
         return f"`{pattern}`"
+    if "exclusiveMinimum" in schema:
+        return f"above {schema['exclusiveMinimum']}, at most {schema['maximum']}"
     if "maximum" in schema:
         step = f", multiple of {schema['multipleOf']}" if "multipleOf" in schema else ""
         return f"{schema['minimum']} to {schema['maximum']}{step}"
-    if "exclusiveMinimum" in schema:
-        return f"above {schema['exclusiveMinimum']}"
     if "minimum" in schema:
         return f"at least {schema['minimum']}"
     return "true, false" if schema.get("type") == "boolean" else "object"

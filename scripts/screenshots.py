@@ -115,7 +115,7 @@ def tour(browser, address, film, out):
     drop(page, film)
     page.wait_for_timeout(2500)
     begun = time.monotonic()
-    page.get_by_text(say(page, "film.swims")).wait_for(timeout=LONG_MS)
+    page.get_by_text(say(page, "film.flock")).wait_for(timeout=LONG_MS)
     cuts.append((begun, time.monotonic() - 0.5))
     expect_swimming(page)
     page.wait_for_timeout(2000)

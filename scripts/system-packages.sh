@@ -3,7 +3,7 @@
 # this list.
 #
 #   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | scale-test |
-#                                           truth-test | page-test | contract-test | bench | arm-test
+#                                           truth-test | page-test | contract-test | fuzz | bench | arm-test
 #
 # Prints the packages that it installs. Uses sudo if it does not run as root. Exits with 1 if a package is
 # still missing afterwards.
@@ -30,6 +30,9 @@ page-test python3   python3-venv
 page-test ffmpeg    ffmpeg
 contract-test python3 python3-venv
 contract-test ffmpeg  ffmpeg
+fuzz      c++       g++
+fuzz      ffmpeg    ffmpeg
+fuzz      ffprobe   ffmpeg
 bench     wrk       wrk
 bench     nginx     nginx-light
 bench     curl      curl

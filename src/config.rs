@@ -29,6 +29,14 @@ pub struct Config {
     /// Requests per second allowed to each token owner, with bursts of 4 times as many; 0 sets no limit.
     #[arg(long, env = "FLOCKREEL_RATE", default_value_t = 200, value_name = "N")]
     pub rate: u32,
+    /// Requests of one token owner that may be open at once, including event streams; 0 sets no limit.
+    #[arg(
+        long,
+        env = "FLOCKREEL_MAX_OPEN_REQUESTS",
+        default_value_t = 256,
+        value_name = "N"
+    )]
+    pub max_open_requests: u32,
     /// Maximum number of jobs of all users that may be queued or running at once.
     #[arg(long, env = "FLOCKREEL_MAX_QUEUED", default_value_t = 10_000, value_name = "N",
         value_parser = clap::value_parser!(i64).range(0..))]
@@ -47,6 +55,48 @@ pub struct Config {
         value_name = "N"
     )]
     pub disk_reserve_bytes: u64,
+    /// Space of each owner.
+    #[command(flatten)]
+    pub owner_space: OwnerSpace,
+    /// Deletion of old data.
+    #[command(flatten)]
+    pub retention: Retention,
+}
+
+/// Limit of the space that each owner may use.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct OwnerSpace {
+    /// Maximum total size of the stored files and open uploads of one owner, bytes; 0 sets no limit.
+    #[arg(
+        long,
+        env = "FLOCKREEL_MAX_OWNER_BYTES",
+        default_value_t = OwnerSpace::MAX_OWNER_BYTES,
+        value_name = "N"
+    )]
+    pub max_owner_bytes: u64,
+}
+
+/// Ages at which data is deleted.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct Retention {
+    /// Days after which footage, libraries, flocks and virtual fish that nobody used are deleted; 0 keeps them. Pinned
+    /// ones stay, and so does everything that a kept one was made from.
+    #[arg(
+        long,
+        env = "FLOCKREEL_KEEP_DAYS",
+        default_value_t = 0,
+        value_name = "N"
+    )]
+    pub keep_days: u32,
+    /// Days after which failed and cancelled jobs are deleted; 0 keeps them. Jobs that are done are deleted with their
+    /// results.
+    #[arg(
+        long,
+        env = "FLOCKREEL_KEEP_JOBS_DAYS",
+        default_value_t = Retention::KEEP_JOBS_DAYS,
+        value_name = "N"
+    )]
+    pub keep_jobs_days: u32,
 }
 
 /// Settings of the media tools, for every command that reads or writes video.
@@ -113,9 +163,18 @@ pub struct Storage {
 /// The workers of a process.
 #[derive(Args, Clone, Debug)]
 pub struct JobSettings {
-    /// Number of jobs that run at once. They share the processor cores.
+    /// Number of jobs that run at once. They share the processor cores. From 2 on, one of them is a small job, or
+    /// none.
     #[arg(long, env = "FLOCKREEL_WORKERS", default_value_t = default_workers(), value_name = "N")]
     pub workers: NonZeroUsize,
+    /// Memory limit of one job without its media tools, bytes. A job that exceeds it fails with `memory_limit`.
+    #[arg(
+        long,
+        env = "FLOCKREEL_JOB_MEMORY_BYTES",
+        default_value_t = JobSettings::JOB_MEMORY_BYTES,
+        value_name = "N"
+    )]
+    pub job_memory_bytes: u64,
     /// Time limit of one job, seconds. A job that exceeds it fails with `time_limit`.
     #[arg(
         long,
@@ -182,19 +241,48 @@ impl Config {
     }
 }
 
+impl OwnerSpace {
+    /// Default limit of an owner, bytes: half of a disk of 64 GiB, so that one owner alone does not fill it.
+    pub const MAX_OWNER_BYTES: u64 = 32 << 30;
+}
+
+impl Retention {
+    /// Default age at which failed and cancelled jobs are deleted, days. Free choice.
+    pub const KEEP_JOBS_DAYS: u32 = 90;
+
+    /// Returns the time before which unused resources are deleted, milliseconds since 1970; `None` if they are kept.
+    pub fn unused_before_ms(&self, now_ms: i64) -> Option<i64> {
+        days_before(self.keep_days, now_ms)
+    }
+
+    /// Returns the time before which failed and cancelled jobs are deleted, milliseconds since 1970; `None` if they
+    /// are kept.
+    pub fn jobs_before_ms(&self, now_ms: i64) -> Option<i64> {
+        days_before(self.keep_jobs_days, now_ms)
+    }
+}
+
+fn days_before(n_days: u32, now_ms: i64) -> Option<i64> {
+    (n_days > 0).then(|| now_ms - i64::from(n_days) * 24 * 3600 * 1000)
+}
+
 impl JobSettings {
     /// Default time limit of a job, seconds. An hour of footage takes a few hours on a small machine.
     pub const JOB_TIME_S: u64 = 6 * 3600;
+    /// Default memory limit of a job, bytes: as much as a media tool may use. The largest flock takes less than half.
+    pub const JOB_MEMORY_BYTES: u64 = 4 << 30;
 
-    /// Returns the number of threads that one worker may use: cores divided by workers, at least 1.
+    /// Returns the number of threads that one worker may use, as [`threads_per_worker`] does.
     pub fn threads_per_worker(&self) -> usize {
         threads_per_worker(self.workers)
     }
 }
 
-/// Returns the number of threads that each of `workers` workers may use, at least 1.
+/// Returns the number of threads that each of `workers` workers may use, at least 1. The worker for small jobs is
+/// mostly idle, so the others share the cores.
 pub fn threads_per_worker(workers: NonZeroUsize) -> usize {
-    (cores() / workers).max(1)
+    let n_large = (workers.get() - 1).max(1);
+    (cores() / n_large).max(1)
 }
 
 impl Storage {
@@ -220,15 +308,18 @@ impl FromStr for Database {
     type Err = String;
 
     fn from_str(url: &str) -> Result<Database, String> {
+        let wrong = || "the database must be sqlite:PATH or postgres://USER:PASSWORD@HOST/NAME";
         match url.split_once(':') {
-            Some(("sqlite", path)) if !path.is_empty() => {
-                let path = path.strip_prefix("//").unwrap_or(path);
-                Ok(Database::Sqlite(PathBuf::from(path)))
+            Some(("sqlite", path)) => {
+                let file = PathBuf::from(path.strip_prefix("//").unwrap_or(path));
+                // SQLite would take an empty path for a database that is deleted at the end.
+                let is_file = file.file_name().is_some();
+                is_file
+                    .then_some(Database::Sqlite(file))
+                    .ok_or(wrong().into())
             }
             Some(("postgres" | "postgresql", _)) => Ok(Database::Postgres(url.to_owned())),
-            _ => Err(
-                "the database must be sqlite:PATH or postgres://USER:PASSWORD@HOST/NAME".to_owned(),
-            ),
+            _ => Err(wrong().to_owned()),
         }
     }
 }
@@ -266,13 +357,38 @@ impl std::fmt::Debug for Database {
     }
 }
 
-/// Returns the default number of workers: one for every two cores, at least 1. An analysis keeps two cores
-/// busy (decoder and tracking).
+/// Returns the default number of workers: one for every two cores, at least 1, and one for small jobs. An analysis
+/// keeps two cores busy (decoder and tracking).
 pub fn default_workers() -> NonZeroUsize {
-    NonZeroUsize::new(cores() / 2).unwrap_or(NonZeroUsize::MIN)
+    NonZeroUsize::MIN.saturating_add((cores() / 2).max(1))
 }
 
 /// Returns the number of cores that this process may use, at least 1.
 pub fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn database_must_name_a_file_or_a_server() {
+        let sqlite = |path: &str| Ok(Database::Sqlite(PathBuf::from(path)));
+        assert_eq!("sqlite:a/b.db".parse(), sqlite("a/b.db"));
+        assert_eq!("sqlite:///a/b.db".parse(), sqlite("/a/b.db"));
+        let server = "postgres://h/name".to_owned();
+        assert_eq!(server.parse(), Ok(Database::Postgres(server)));
+        for wrong in [
+            "sqlite:",
+            "sqlite://",
+            "sqlite:///",
+            "sqlite:..",
+            "mysql://h",
+            "",
+        ] {
+            let sentence = wrong.parse::<Database>().unwrap_err();
+            assert!(sentence.starts_with("the database must be"), "{wrong}");
+        }
+    }
 }

@@ -25,6 +25,8 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 const SHUTDOWN_WAIT: Duration = Duration::from_millis(50);
 
 static QUEUE: OnceLock<NonBlocking> = OnceLock::new();
+/// Filter and format of the log, once it has started.
+static SETTINGS: OnceLock<(String, LogFormat)> = OnceLock::new();
 /// Number of lines that stderr did not take.
 static N_UNWRITTEN: AtomicU64 = AtomicU64::new(0);
 /// Whether the process is ending.
@@ -60,6 +62,7 @@ pub fn start(filter: &str, format: LogFormat) -> Log {
         .thread_name("log")
         .finish(Stderr { is_stuck: false });
     let queue = QUEUE.get_or_init(|| queue).clone();
+    SETTINGS.get_or_init(|| (filter.to_owned(), format));
     let lines = tracing_subscriber::fmt()
         .with_env_filter(EnvFilter::new(filter))
         .with_writer(queue)
@@ -99,6 +102,27 @@ pub fn say(line: &str) {
         Some(queue) => queue.clone().write_all(line.as_bytes()).ok(),
         None => io::stderr().write_all(line.as_bytes()).ok(),
     };
+}
+
+/// Returns the command-line arguments that give a child process the log of this process; none before it has started.
+pub fn arguments() -> Vec<String> {
+    let Some((filter, format)) = SETTINGS.get() else {
+        return Vec::new();
+    };
+    let format = format.to_possible_value();
+    let format = format.map_or_else(String::new, |value| value.get_name().to_owned());
+    vec![format!("--log={filter}"), format!("--log-format={format}")]
+}
+
+/// Writes a line from the stderr of a child process whose log has the same format. In a log of JSON objects, another
+/// line, such as the last words of the standard library, becomes an event.
+pub fn relay(line: &str) {
+    match SETTINGS.get() {
+        Some((_, LogFormat::Json)) if !line.starts_with('{') => {
+            tracing::warn!("a child process says: {line}");
+        }
+        _ => say(line),
+    }
 }
 
 /// Returns the number of lines that were dropped since the process started.

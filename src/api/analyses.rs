@@ -126,10 +126,11 @@ pub(super) async fn create_analysis(
         let footage_id = FootageId(footage_id);
         let owners = &access.caller.owners;
         let footage = access.store().resource::<Footage>(footage_id.0, owners);
-        if footage.await?.is_none() {
+        let Some(footage) = footage.await? else {
             let sentence = format!("the footage does not exist: {footage_id}");
             return Err(Problem::new(Code::InvalidParams, sentence));
-        }
+        };
+        access.note_use::<Footage>(&footage);
         Input { footage_id, params }
     };
     let (job_id, library_id) = access.enqueue(&input, None, &mut ids).await?;

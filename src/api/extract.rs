@@ -30,7 +30,8 @@ impl Access {
         &self.state.context.store
     }
 
-    /// Queues a job for the caller. Returns the id of the job and the id that its result will have.
+    /// Queues a job for the caller. Returns the id of the job and the id that its result will have. Fails with
+    /// `owner_storage_full` if the caller has no space for any result.
     pub(super) async fn enqueue<Input: JobInput>(
         &self,
         input: &Input,
@@ -38,6 +39,7 @@ impl Access {
         ids: &mut IdSequence,
     ) -> Result<(JobId, Input::ResultId), Problem> {
         let account = &self.caller.account;
+        self.store().require_space_left(&account.owner).await?;
         let queued = self.state.context.enqueue(input, after_job, account, ids);
         Ok(queued.await?)
     }

@@ -13,7 +13,7 @@ use super::extract::{Access, Conditions, FileOf, Id, Json};
 use super::jobs::{accepted, job_to_follow};
 use super::paging::{FilmQuery, Filtered, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
-use super::resources::{FileView, Reference, ResultView, View};
+use super::resources::{FileView, Reference, ResultChange, ResultView, View};
 use super::timestamp::rfc3339;
 use crate::jobs::IdSequence;
 use crate::jobs::fish::{Input, Summary};
@@ -67,6 +67,10 @@ pub(super) struct FishView {
     name: String,
     /// Whether it was made from the sample of an empty data folder.
     sample: bool,
+    /// Whether it stays even if nobody uses it.
+    pinned: bool,
+    /// Time of the last use, exact to the hour, RFC 3339 in UTC.
+    used_at: String,
     /// Size of all files, bytes.
     size_bytes: i64,
     /// Time of creation, RFC 3339 in UTC.
@@ -135,6 +139,23 @@ pub(super) async fn get_fish(access: Access, Id(id): Id) -> JsonAnswer<FishView>
     access.get_result(id).await
 }
 
+/// Pin a virtual fish, or unpin it.
+///
+/// A pinned virtual fish stays even if nobody uses it, and so does everything that it was made from.
+#[utoipa::path(patch, path = "/v1/fish/{id}", params(("id" = Uuid, Path)), request_body = ResultChange,
+    responses(
+    (status = 200, body = FishView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn change_fish(
+    access: Access,
+    Id(id): Id,
+    Json(change): Json<ResultChange>,
+) -> JsonAnswer<FishView> {
+    access.change_result(id, change).await
+}
+
 /// Delete a virtual fish and its job.
 #[utoipa::path(delete, path = "/v1/fish/{id}", params(("id" = Uuid, Path)), responses(
     (status = 204, description = "deleted"),
@@ -164,6 +185,7 @@ pub(super) async fn get_fish_file(
 ) -> Answer {
     let (name, media_type) = find_file(FILES, &name)?;
     let fish = access.find::<Fish>(id).await?;
+    access.note_use::<Fish>(&fish);
     let extension = if name == "video.mp4" { "mp4" } else { "glb" };
     let label = format!("{}_fish.{extension}", stem(&fish.name));
     let download = Download {
@@ -190,6 +212,8 @@ impl View for FishView {
             library_id: row.library_id,
             name: row.name,
             sample: row.sample,
+            pinned: row.pinned,
+            used_at: rfc3339(row.used_ms),
             size_bytes: row.size_bytes,
             created_at: rfc3339(row.created_ms),
             params: super::stored(&row.params)?,

@@ -6,7 +6,7 @@
 use axum::extract::{Query, Request};
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
@@ -23,6 +23,8 @@ use crate::jobs::admit::ReceivedFiles;
 use crate::jobs::{Error, admit};
 use crate::store::blobs::hex;
 use crate::store::footage::{Added, Footage, POSTER, VIDEO};
+use crate::store::resources::Property;
+use flockreel_core::code::Code;
 
 /// An uploaded video.
 #[derive(Clone, Debug, Serialize, ToSchema)]
@@ -46,16 +48,32 @@ pub(super) struct FootageView {
     has_masks: bool,
     /// Whether the program itself made this footage, as the sample of an empty data folder.
     sample: bool,
+    /// Whether it stays even if nobody uses it.
+    pinned: bool,
+    /// Time of the last use, exact to the hour, RFC 3339 in UTC.
+    used_at: String,
     /// Time of the upload, RFC 3339 in UTC.
     created_at: String,
 }
 
-/// New properties of footage.
+/// New properties of footage. Those that are left out stay as they are.
 #[derive(Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
+#[schema(min_properties = 1)]
 pub(super) struct FootageChange {
     /// Name for people; may be empty.
-    name: String,
+    #[serde(default, deserialize_with = "given")]
+    #[schema(value_type = String, required = false)]
+    name: Option<String>,
+    /// Whether it stays even if nobody uses it.
+    #[serde(default, deserialize_with = "given")]
+    #[schema(value_type = bool, required = false)]
+    pinned: Option<bool>,
+}
+
+/// Reads a property that is given. Fails for null.
+fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(json: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(json).map(Some)
 }
 
 /// Query parameters of an upload.
@@ -152,9 +170,9 @@ pub(super) async fn get_footage(access: Access, Id(id): Id) -> JsonAnswer<Footag
     access.get(id).await
 }
 
-/// Rename footage.
+/// Rename or pin footage.
 ///
-/// The libraries, flocks and virtual fish made from it show the new name too. Like the name of an upload, it is
+/// Pinned footage stays even if nobody uses it. The libraries, flocks and virtual fish made from it show the new name too. Like the name of an upload, it is
 /// cut to 200 characters and loses folders and control characters.
 #[utoipa::path(patch, path = "/v1/footage/{id}", params(("id" = Uuid, Path)), request_body = FootageChange,
     responses(
@@ -162,16 +180,20 @@ pub(super) async fn get_footage(access: Access, Id(id): Id) -> JsonAnswer<Footag
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
-pub(super) async fn rename_footage(
+pub(super) async fn change_footage(
     access: Access,
     Id(id): Id,
     Json(change): Json<FootageChange>,
 ) -> JsonAnswer<FootageView> {
-    access.find::<Footage>(id).await?;
-    let (name, owners) = (label(&change.name), &access.caller.owners);
-    if !access.store().rename_footage(id, &name, owners).await? {
-        return Err(Problem::not_found());
+    let name = change.name.as_deref().map(label);
+    let name = name.as_deref().map(Property::Name);
+    let pinned = change.pinned.map(Property::Pinned);
+    let properties: Vec<_> = name.into_iter().chain(pinned).collect();
+    if properties.is_empty() {
+        let sentence = "the change must have a name or pinned";
+        return Err(Problem::new(Code::InvalidParams, sentence));
     }
+    access.change::<Footage>(id, &properties).await?;
     access.get(id).await
 }
 
@@ -197,6 +219,7 @@ pub(super) async fn delete_footage(access: Access, Id(id): Id) -> Result<StatusC
 ))]
 pub(super) async fn get_footage_file(access: Access, Id(id): Id, conditions: Conditions) -> Answer {
     let footage = access.find::<Footage>(id).await?;
+    access.note_use::<Footage>(&footage);
     let label = match footage.name.as_str() {
         "" => "footage",
         name => name,
@@ -254,6 +277,8 @@ impl View for FootageView {
             has_background: !footage.background_sha256.is_empty(),
             has_masks: !footage.masks_sha256.is_empty(),
             sample: footage.sample,
+            pinned: footage.pinned,
+            used_at: rfc3339(footage.used_ms),
             created_at: rfc3339(footage.created_ms),
         })
     }

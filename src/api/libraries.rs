@@ -8,13 +8,12 @@ use tokio_util::io::ReaderStream;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
-use super::AppState;
 use super::download::names::{saved_as, stem};
 use super::download::{Download, Files, built, find as find_file, matches};
-use super::extract::{Access, Conditions, FileOf, Id};
+use super::extract::{Access, Conditions, FileOf, Id, Json};
 use super::paging::{Filtered, LibraryQuery, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
-use super::resources::{FileView, ResultView, View};
+use super::resources::{FileView, ResultChange, ResultView, View};
 use super::timestamp::rfc3339;
 use crate::jobs::analysis::Summary;
 use crate::jobs::{self, synchronous};
@@ -46,6 +45,9 @@ const FILES: Files = &[
     ("mattes.zip", "application/zip"),
 ];
 
+/// Name of the picture of a library in lists. To see it there is no use of the library.
+const LIST_PICTURE: &str = "poster.jpg";
+
 /// Name of the file that is not stored, but computed for each request.
 const DISTANCE_ARRAY: &str = "distance.npy";
 
@@ -64,6 +66,10 @@ pub(super) struct LibraryView {
     name: String,
     /// Whether it was made from the sample of an empty data folder.
     sample: bool,
+    /// Whether it stays even if nobody uses it.
+    pinned: bool,
+    /// Time of the last use, exact to the hour, RFC 3339 in UTC.
+    used_at: String,
     /// Size of all files, bytes.
     size_bytes: i64,
     /// Time of creation, RFC 3339 in UTC.
@@ -100,6 +106,23 @@ pub(super) async fn list_libraries(
 ))]
 pub(super) async fn get_library(access: Access, Id(id): Id) -> JsonAnswer<LibraryView> {
     access.get_result(id).await
+}
+
+/// Pin a library, or unpin it.
+///
+/// A pinned library stays even if nobody uses it, and so does everything that it was made from.
+#[utoipa::path(patch, path = "/v1/libraries/{id}", params(("id" = Uuid, Path)), request_body = ResultChange,
+    responses(
+    (status = 200, body = LibraryView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn change_library(
+    access: Access,
+    Id(id): Id,
+    Json(change): Json<ResultChange>,
+) -> JsonAnswer<LibraryView> {
+    access.change_result(id, change).await
 }
 
 /// Delete a library and everything made from it.
@@ -144,10 +167,14 @@ pub(super) async fn get_library_file(
 ) -> Answer {
     if name == DISTANCE_ARRAY {
         let library = access.find::<Library>(id).await?;
-        return distance_array(&access.state, &library, &conditions).await;
+        access.note_use::<Library>(&library);
+        return distance_array(&access, &library, &conditions).await;
     }
     let (name, media_type) = find_file(FILES, &name)?;
     let library = access.find::<Library>(id).await?;
+    if name != LIST_PICTURE {
+        access.note_use::<Library>(&library);
+    }
     let download = Download {
         folder: &library.folder,
         name,
@@ -163,7 +190,7 @@ fn saved_name(library: &Library, name: &str) -> String {
 }
 
 /// Returns distance.npy. The library's files never change, so clients may cache the result forever.
-async fn distance_array(state: &AppState, library: &Library, conditions: &Conditions) -> Answer {
+async fn distance_array(access: &Access, library: &Library, conditions: &Conditions) -> Answer {
     let etag = format!("\"{}-{DISTANCE_ARRAY}\"", library.id);
     let known = conditions.headers.get(header::IF_NONE_MATCH);
     let answer = Response::builder().header(header::ETAG, &etag).header(
@@ -174,7 +201,8 @@ async fn distance_array(state: &AppState, library: &Library, conditions: &Condit
     if known.is_some_and(|tags| matches(tags, &etag)) {
         return built(answer.status(StatusCode::NOT_MODIFIED).body(Body::empty()));
     }
-    let file = synchronous::distance_file(&state.context, library).await?;
+    let (context, owner) = (&access.state.context, &access.caller.account.owner);
+    let file = synchronous::distance_file(context, owner, library).await?;
     let n_bytes = file.metadata().map_err(jobs::Error::Io)?.len();
     let file = ReaderStream::new(tokio::fs::File::from_std(file));
     built(
@@ -207,6 +235,8 @@ impl View for LibraryView {
             footage_id: row.footage_id,
             name: row.name,
             sample: row.sample,
+            pinned: row.pinned,
+            used_at: rfc3339(row.used_ms),
             size_bytes: row.size_bytes,
             created_at: rfc3339(row.created_ms),
             params: super::stored(&row.params)?,

@@ -26,9 +26,9 @@ mod monitoring; // health, metrics, request ids
 mod page; // the web page, /docs, /openapi.json
 mod uploads;
 
+use std::collections::HashSet;
 use std::ops::Deref;
-use std::sync::Arc;
-use std::time::Duration;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::extract::{DefaultBodyLimit, Request, State};
 use axum::middleware::Next;
@@ -39,17 +39,19 @@ use tower_http::timeout::RequestBodyTimeoutLayer;
 use utoipa::OpenApi;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
+use uuid::Uuid;
 
 pub use access::signed;
 pub use monitoring::metrics::{metrics_router, worker_metrics_router};
 pub use problem::Problem;
 
 use download::compression;
+use download::if_match::check_if_match;
 
-use access::{HostNames, Rates, authenticate, guard, session};
+use access::{HostNames, OpenRequests, Rates, authenticate, guard, session};
 use monitoring::metrics::Metrics;
 use monitoring::observe::{Requests, observe};
-use monitoring::{health, metrics};
+use monitoring::{health, metrics, usage};
 use page::{docs, errors, examples, openapi};
 use receive::CHUNK_TIMEOUT;
 
@@ -57,6 +59,7 @@ use crate::config::Config;
 use crate::jobs::Context;
 use crate::jobs::supervisor::recover;
 use crate::store::Store;
+use crate::store::space::SpaceLimits;
 use crate::{media, store};
 use flockreel_core::code::Code;
 
@@ -78,6 +81,10 @@ pub struct Shared {
     pub media_tool: Result<media::SandboxStatus, String>,
     /// Rate limits of owners and addresses.
     rates: Rates,
+    /// Open requests of owners and addresses.
+    open_requests: OpenRequests,
+    /// Resources whose use is being recorded.
+    uses: Mutex<HashSet<Uuid>>,
     /// Counters of HTTP requests.
     requests: Requests,
     /// All metrics of the service.
@@ -92,14 +99,24 @@ impl Deref for AppState {
     }
 }
 
+impl Shared {
+    fn uses(&self) -> MutexGuard<'_, HashSet<Uuid>> {
+        self.uses.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 impl AppState {
     /// Opens the store, recovers from a crash, and searches for the media tool. Fails if the store cannot be
     /// opened. A missing media tool is only logged.
     pub async fn open(config: Config) -> Result<AppState, store::Error> {
         let store = Store::open(config.storage.clone()).await?;
-        let mut context = Context::new(store, config.jobs.threads_per_worker());
-        context.budget = Duration::from_secs(config.jobs.job_time_s);
+        let store = store.with_space_limits(SpaceLimits {
+            max_owner_bytes: config.owner_space.max_owner_bytes,
+            disk_reserve_bytes: config.disk_reserve_bytes,
+        });
+        let mut context = Context::for_jobs(store, &config.jobs);
         context.max_queued = config.max_queued;
+        context.retention = config.retention;
         context.min_free_bytes = Config::job_reserve_bytes(config.disk_reserve_bytes);
         recover(&context).await?;
         let tool = tokio::task::spawn_blocking(media::sandbox_status).await;
@@ -113,6 +130,8 @@ impl AppState {
             metrics: Metrics::new(&context.meters, &requests),
             requests,
             rates: Rates::new(config.rate),
+            open_requests: OpenRequests::new(config.max_open_requests),
+            uses: Mutex::default(),
             config,
             context,
             media_tool: tool.map_err(|error| error.to_string()),
@@ -139,6 +158,7 @@ pub fn router(state: AppState) -> Router {
         .fallback(page::get_missing)
         .method_not_allowed_fallback(|| async { Problem::from(Code::MethodNotAllowed) })
         .with_state(state.clone())
+        .layer(middleware::from_fn(check_if_match))
         .layer(middleware::from_fn_with_state(
             state.clone(),
             idempotency::run_once,
@@ -165,7 +185,7 @@ fn table() -> OpenApiRouter<AppState> {
         .routes(routes!(footage::create_footage, footage::list_footage))
         .routes(routes!(
             footage::get_footage,
-            footage::rename_footage,
+            footage::change_footage,
             footage::delete_footage
         ))
         .routes(routes!(footage::get_footage_file))
@@ -178,21 +198,35 @@ fn table() -> OpenApiRouter<AppState> {
         ))
         .routes(routes!(analyses::create_analysis))
         .routes(routes!(libraries::list_libraries))
-        .routes(routes!(libraries::get_library, libraries::delete_library))
+        .routes(routes!(
+            libraries::get_library,
+            libraries::change_library,
+            libraries::delete_library
+        ))
         .routes(routes!(libraries::get_library_file))
         .routes(routes!(flocks::create::create_flock, flocks::list_flocks))
         .routes(routes!(flocks::preview::preview_flock))
-        .routes(routes!(flocks::get_flock, flocks::delete_flock))
+        .routes(routes!(
+            flocks::get_flock,
+            flocks::change_flock,
+            flocks::delete_flock
+        ))
         .routes(routes!(flocks::get_flock_file))
         .routes(routes!(flocks::links::create_flock_link))
         .routes(routes!(fish::create_fish, fish::list_fish))
-        .routes(routes!(fish::get_fish, fish::delete_fish))
+        .routes(routes!(
+            fish::get_fish,
+            fish::change_fish,
+            fish::delete_fish
+        ))
         .routes(routes!(fish::get_fish_file))
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
+        .routes(routes!(jobs::retry::retry_job))
         .routes(routes!(jobs::get_refused_jpeg))
         .routes(routes!(jobs::events::get_job_events))
         .routes(routes!(jobs::events::get_events))
+        .routes(routes!(usage::get_usage))
         .routes(routes!(errors::list_errors))
         .routes(routes!(session::begin_session, session::end_session))
         .routes(routes!(health::healthz))

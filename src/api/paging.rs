@@ -143,6 +143,12 @@ impl<S: Send + Sync, Q: DeserializeOwned + Into<Listing>> FromRequestParts<S> fo
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Filtered<Q>, Problem> {
         let listing: Listing = read::<Q, S>(parts, state).await?.into();
         listing.paging.checked()?;
+        // PostgreSQL refuses this character in a text, and no name has it.
+        let name = listing.filter.name_contains.as_deref();
+        if name.is_some_and(|name| name.contains('\0')) {
+            let sentence = "q must not contain the character U+0000";
+            return Err(Problem::new(Code::InvalidParams, sentence));
+        }
         Ok(Filtered(listing, std::marker::PhantomData))
     }
 }

@@ -213,7 +213,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         | Code::InputFailed
         | Code::IdempotencyKeyReused
         | Code::InvalidParams => StatusCode::UNPROCESSABLE_ENTITY,
-        Code::StorageFull => StatusCode::INSUFFICIENT_STORAGE,
+        Code::StorageFull | Code::OwnerStorageFull => StatusCode::INSUFFICIENT_STORAGE,
         // A cancelled job has no result. Only requests for the result get its code.
         Code::NotFound | Code::NotReady | Code::Cancelled => StatusCode::NOT_FOUND,
         Code::MethodNotAllowed => StatusCode::METHOD_NOT_ALLOWED,
@@ -226,9 +226,10 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::RangeNotSatisfiable => StatusCode::RANGE_NOT_SATISFIABLE,
         // Status 460 comes from the tus protocol and has no name in HTTP.
         Code::ChecksumMismatch => StatusCode::from_u16(460).unwrap_or(StatusCode::BAD_REQUEST),
-        Code::TusVersionNotSupported => StatusCode::PRECONDITION_FAILED,
+        Code::TusVersionNotSupported | Code::PreconditionFailed => StatusCode::PRECONDITION_FAILED,
         Code::AlreadyFinished
         | Code::AlreadyStored
+        | Code::RetryRefused
         | Code::RequestInProgress
         | Code::OffsetDiffers => StatusCode::CONFLICT,
         Code::Unauthenticated => StatusCode::UNAUTHORIZED,

@@ -1,8 +1,8 @@
 //! Request bodies to disk: the same code receives raw bodies and the fields of forms
 //! (docs/explanation/promises.md, "Size limits").
 //!
-//! Files go to a draft folder and are hashed and synced on the way. Every file has a size limit. The free
-//! space of the disk is checked before and during the transfer.
+//! Files go to a draft folder and are hashed and synced on the way. Every file has a size limit. The space of the owner
+//! and of the disk is checked before and during the transfer.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -22,12 +22,13 @@ use crate::store;
 use crate::store::footage::{BACKGROUND, MASKS, VIDEO};
 use crate::store::intake::Intake;
 use crate::store::owners::Owner;
+use crate::store::space::{Announced, Counted};
 use crate::store::{BlobFile, Draft};
 use flockreel_core::code::Code;
 
 /// Longest wait for the next chunk of a body (docs/explanation/promises.md, "Slow clients"). Free choice.
 pub(super) const CHUNK_TIMEOUT: Duration = Duration::from_secs(30);
-/// Number of bytes after which the free space of the disk is checked again. Other requests fill the disk too,
+/// Number of bytes after which the space is checked again. Other requests fill the disk too,
 /// and a body need not declare its length. Free choice.
 pub(super) const CHECK_EVERY_BYTES: u64 = 8 << 20;
 /// Prefixes of the media types of bodies that are footage, or a form with footage.
@@ -78,17 +79,19 @@ pub(super) async fn receive_with_json(
     form: Form,
 ) -> Result<(ReceivedFiles, JsonFields), Problem> {
     check_headers(&request, state.config.max_upload_bytes)?;
-    check_free_space(state, body_bytes(&request).unwrap_or(0))?;
+    let store = &state.context.store;
+    let n_bytes = body_bytes(&request).unwrap_or(0);
+    let mut announced = store.announce(&form.owner, n_bytes).await?;
     let draft_name = uuid::Uuid::now_v7().to_string();
-    let draft = state.context.store.blobs().draft(&draft_name);
+    let draft = store.blobs().draft(&draft_name);
     let draft = draft.map_err(store::Error::Io)?;
     if is_form(&request) {
-        return receive_form(state, request, draft, form).await;
+        return receive_form(state, request, draft, form, announced).await;
     }
     let body = request.into_body().into_data_stream();
     let limit_bytes = state.config.max_upload_bytes;
     let intake = Intake::create(&draft, VIDEO, limit_bytes).await?;
-    let video = receive_file(state, body, intake).await?;
+    let video = receive_file(&mut announced, body, intake).await?;
     let received = ReceivedFiles {
         draft,
         video,
@@ -96,6 +99,7 @@ pub(super) async fn receive_with_json(
         masks: None,
         name: label(form.name.as_deref().unwrap_or_default()),
         owner: form.owner,
+        counted: Counted::Body(announced),
     };
     Ok((received, JsonFields::new()))
 }
@@ -105,6 +109,7 @@ async fn receive_form(
     mut request: Request,
     draft: Draft,
     form: Form,
+    mut announced: Announced,
 ) -> Result<(ReceivedFiles, JsonFields), Problem> {
     // Every field has its own limit.
     DefaultBodyLimit::disable().apply(&mut request);
@@ -120,15 +125,15 @@ async fn receive_form(
             Some("video" | "footage") if video.is_none() => {
                 file_name = field.file_name().map(str::to_owned);
                 let intake = Intake::create(&draft, VIDEO, limit_bytes).await?;
-                video = Some(receive_file(state, field, intake).await?);
+                video = Some(receive_file(&mut announced, field, intake).await?);
             }
             Some("background") if background.is_none() => {
                 let intake = Intake::create(&draft, BACKGROUND, MAX_BACKGROUND_BYTES).await?;
-                background = Some(receive_file(state, field, intake).await?);
+                background = Some(receive_file(&mut announced, field, intake).await?);
             }
             Some("masks") if masks.is_none() => {
                 let intake = Intake::create(&draft, MASKS, limit_bytes).await?;
-                masks = Some(receive_file(state, field, intake).await?);
+                masks = Some(receive_file(&mut announced, field, intake).await?);
             }
             name => {
                 let known = form.json_fields.iter().find(|known| name == Some(known));
@@ -147,6 +152,7 @@ async fn receive_form(
         masks,
         name: label(&form.name.or(file_name).unwrap_or_default()),
         owner: form.owner,
+        counted: Counted::Body(announced),
     };
     Ok((received, json_fields))
 }
@@ -178,9 +184,9 @@ async fn next_field(form: &mut Multipart) -> Result<Option<Field<'_>>, Problem> 
 }
 
 /// Writes a stream to a file. Returns its size and hash. Fails if the stream exceeds the limit of the file,
-/// stalls or is cut off, or if the disk is full.
+/// stalls or is cut off, or if there is no space for it.
 async fn receive_file<S, E>(
-    state: &AppState,
+    announced: &mut Announced,
     mut stream: S,
     mut intake: Intake,
 ) -> Result<BlobFile, Problem>
@@ -188,7 +194,7 @@ where
     S: Stream<Item = Result<Bytes, E>> + Unpin,
     E: std::error::Error,
 {
-    match write_stream(state, &mut stream, &mut intake).await {
+    match write_stream(announced, &mut stream, &mut intake).await {
         Ok(()) => Ok(intake.finish().await?),
         Err(problem) => {
             intake.give_up().await;
@@ -198,7 +204,7 @@ where
 }
 
 async fn write_stream<S, E>(
-    state: &AppState,
+    announced: &mut Announced,
     stream: &mut S,
     intake: &mut Intake,
 ) -> Result<(), Problem>
@@ -212,7 +218,7 @@ where
             Ok(Some(Ok(bytes))) => {
                 n_unchecked += bytes.len() as u64;
                 if n_unchecked >= CHECK_EVERY_BYTES {
-                    check_free_space(state, 0)?;
+                    announced.receive(n_unchecked).await?;
                     n_unchecked = 0;
                 }
                 intake.take(bytes).await?;
@@ -221,7 +227,7 @@ where
                 tracing::debug!(%error, "a body was cut off");
                 return Err(code_of_broken_body(&error).into());
             }
-            Ok(None) => return Ok(()),
+            Ok(None) => return Ok(announced.receive(n_unchecked).await?),
             Err(_) => return Err(Code::BodyTimeout.into()),
         }
     }
@@ -247,17 +253,6 @@ fn check_headers(request: &Request, limit_bytes: u64) -> Result<(), Problem> {
 fn body_bytes(request: &Request) -> Option<u64> {
     let length = request.headers().get(header::CONTENT_LENGTH)?;
     length.to_str().ok()?.parse().ok()
-}
-
-/// Fails with `storage_full` if `n_bytes` more would use the reserve of the disk
-/// (docs/explanation/promises.md, "Full disk").
-pub(super) fn check_free_space(state: &AppState, n_bytes: u64) -> Result<(), Problem> {
-    let free_bytes = state.context.store.blobs().free_bytes();
-    let free_bytes = free_bytes.map_err(store::Error::Io)?;
-    if n_bytes.saturating_add(state.config.disk_reserve_bytes) > free_bytes {
-        return Err(Code::StorageFull.into());
-    }
-    Ok(())
 }
 
 /// Returns whether the media type of the body is that of footage or of a form, not of JSON.

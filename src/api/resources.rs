@@ -11,9 +11,14 @@ use super::extract::Access;
 use super::jobs::absent_result;
 use super::paging::{Listing, Page};
 use super::problem::{JsonAnswer, Problem};
+use crate::jobs::clock::now_ms;
 use crate::store::BlobFile;
-use crate::store::resources::{Resource, ResourceFilter};
+use crate::store::resources::{Property, Resource, ResourceFilter};
 use flockreel_core::code::Code;
+
+/// Time for which a recorded use also stands for later ones, milliseconds. Ages are counted in days, so an hour is exact
+/// enough, and reading a resource rarely writes.
+const USE_INTERVAL_MS: i64 = 3600 * 1000;
 
 /// The JSON form of a resource.
 pub(super) trait View: Serialize + Sized {
@@ -37,6 +42,14 @@ pub(super) trait ResultView: View {
 
     /// Returns the view with its files.
     fn with_files(self, files: Vec<FileView>) -> Self;
+}
+
+/// New properties of a library, flock or virtual fish.
+#[derive(Clone, Copy, Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct ResultChange {
+    /// Whether it stays even if nobody uses it.
+    pinned: bool,
 }
 
 /// A file that can be downloaded from below the address of its resource.
@@ -116,12 +129,14 @@ impl Access {
     /// Returns one resource.
     pub(super) async fn get<V: View>(&self, id: Uuid) -> JsonAnswer<V> {
         let row = self.find::<V::Stored>(id).await?;
+        self.note_use::<V::Stored>(&row);
         Ok(axum::Json(V::from_row(row)?))
     }
 
     /// Returns one result with the list of its files.
     pub(super) async fn get_result<V: ResultView>(&self, id: Uuid) -> JsonAnswer<V> {
         let row = self.find::<V::Stored>(id).await?;
+        self.note_use::<V::Stored>(&row);
         let stored = self.store().files_of(V::folder(&row)).await?;
         let files = stored.into_iter().filter_map(|file| {
             let BlobFile {
@@ -136,6 +151,45 @@ impl Access {
         });
         let files = files.collect();
         Ok(axum::Json(V::from_row(row)?.with_files(files)))
+    }
+
+    /// Changes a result and returns it with the list of its files.
+    pub(super) async fn change_result<V: ResultView>(
+        &self,
+        id: Uuid,
+        change: ResultChange,
+    ) -> JsonAnswer<V> {
+        self.change::<V::Stored>(id, &[Property::Pinned(change.pinned)])
+            .await?;
+        self.get_result(id).await
+    }
+
+    /// Changes properties of a resource. Fails with `not_found` if it was deleted in the meantime.
+    pub(super) async fn change<R: Resource>(
+        &self,
+        id: Uuid,
+        properties: &[Property<'_>],
+    ) -> Result<(), Problem> {
+        self.find::<R>(id).await?;
+        let owners = &self.caller.owners;
+        let changed = self.store().change(R::KIND, id, properties, owners);
+        changed.await?.then_some(()).ok_or_else(Problem::not_found)
+    }
+
+    /// Records that a resource is used, at most once an hour. The response neither waits for the record nor depends on it.
+    pub(super) fn note_use<R: Resource>(&self, row: &R::Row) {
+        let (id, now_ms) = (R::id(row), now_ms());
+        if now_ms - R::used_ms(row) < USE_INTERVAL_MS || !self.state.uses().insert(id) {
+            return;
+        }
+        let state = self.state.clone();
+        tokio::spawn(async move {
+            let recorded = state.context.store.record_use(R::KIND, id, now_ms);
+            if let Err(error) = recorded.await {
+                tracing::debug!(%error, resource.id = %id, "the use of a resource was not recorded");
+            }
+            state.uses().remove(&id);
+        });
     }
 
     /// Deletes a resource and returns 204. Fails with `not_found` if it was deleted in the meantime.

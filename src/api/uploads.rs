@@ -19,14 +19,13 @@ use uuid::Uuid;
 use super::AppState;
 use super::extract::{Access, Id};
 use super::problem::{Answer, Problem, ProblemBody};
-use super::receive::{
-    CHECK_EVERY_BYTES, CHUNK_TIMEOUT, check_free_space, code_of_broken_body, label,
-};
+use super::receive::{CHECK_EVERY_BYTES, CHUNK_TIMEOUT, code_of_broken_body, label};
 use crate::jobs::IdSequence;
 use crate::jobs::admit::ReceivedFiles;
 use crate::jobs::clock::now_ms;
 use crate::store::footage::Added;
 use crate::store::owners::OwnerFilter;
+use crate::store::space::Counted;
 use crate::store::uploads::{LIFETIME_MS, Upload, UploadLock};
 use flockreel_core::code::Code;
 
@@ -74,7 +73,9 @@ pub(super) async fn describe_uploads(State(state): State<AppState>) -> Response<
 /// Start a resumable upload.
 ///
 /// `Upload-Length` is the size in bytes, `filename` in `Upload-Metadata` the name. The body may hold the
-/// first bytes. PATCH sends the others to `Location`. An upload without new bytes expires after 24 hours.
+/// first bytes. PATCH sends the others to `Location`. An upload without new bytes expires after 24 hours. An open upload
+/// counts with its whole size: the call fails with `owner_storage_full` if the owner, and with `storage_full` if the disk
+/// has no space for it.
 #[utoipa::path(post, path = "/v1/uploads", request_body(content = [u8], content_type = "application/offset+octet-stream"),
     responses(
     (status = 201, headers(("location" = String), ("upload-offset" = i64), ("upload-expires" = String))),
@@ -88,7 +89,6 @@ pub(super) async fn create_upload(access: Access, mut ids: IdSequence, request: 
     if size_bytes.unsigned_abs() > limit_bytes {
         return Err(crate::store::Error::TooLarge { limit_bytes }.into());
     }
-    check_free_space(&access.state, size_bytes.unsigned_abs())?;
     let upload = Upload {
         id: ids.next_id(),
         owner: access.caller.account.owner.clone(),
@@ -209,10 +209,10 @@ async fn receive_chunk(
         // Other requests fill the disk too, so the free space is checked again from time to time.
         let before = received_bytes - bytes.len() as i64;
         if before / SYNC_EVERY_BYTES != received_bytes / SYNC_EVERY_BYTES
-            && let Err(problem) = check_free_space(state, 0)
+            && let Err(error) = store.check_disk(0)
         {
             received_bytes = before;
-            break Err(problem);
+            break Err(error.into());
         }
         file.append(&bytes).await?;
         if let Some(checksum) = &mut checksum {
@@ -267,6 +267,7 @@ async fn finish_if_complete(state: &AppState, mut upload: Upload) -> Result<Uplo
         masks: None,
         name: upload.name.clone(),
         owner: upload.owner.clone(),
+        counted: Counted::Upload(upload.id),
     };
     match super::footage::admit(state, received).await {
         Ok(Added::New(footage) | Added::Known(footage)) => {

@@ -41,21 +41,21 @@ pub struct Args {
     #[arg(long, value_name = "JSON_FILE")]
     camera: Option<PathBuf>,
     /// Length of the animal from the nose to the tip of the tail, metres. Needs --animal-height.
-    #[arg(long, value_name = "M", requires = "animal_height")]
+    #[arg(long, value_name = "M", value_parser = set::finite, requires = "animal_height")]
     animal_length: Option<f64>,
     /// Height of the animal's silhouette, fins included, metres. Needs --animal-length.
-    #[arg(long, value_name = "M", requires = "animal_length")]
+    #[arg(long, value_name = "M", value_parser = set::finite, requires = "animal_length")]
     animal_height: Option<f64>,
     #[arg(long, help = set::parameter_help::<Params>("view"))]
     view: Option<String>,
     /// Follow the largest animal if several move. Default: the footage is refused.
     #[arg(long)]
     follow_largest: bool,
-    #[arg(long, value_name = "F", help = set::parameter_help::<Params>("fps"))]
+    #[arg(long, value_name = "F", value_parser = set::finite, help = set::parameter_help::<Params>("fps"))]
     fps: Option<f64>,
-    #[arg(long, value_name = "SECONDS", help = set::parameter_help::<Params>("from_s"))]
+    #[arg(long, value_name = "SECONDS", value_parser = set::finite, help = set::parameter_help::<Params>("from_s"))]
     from: Option<f64>,
-    #[arg(long, value_name = "SECONDS", help = set::parameter_help::<Params>("to_s"))]
+    #[arg(long, value_name = "SECONDS", value_parser = set::finite, help = set::parameter_help::<Params>("to_s"))]
     to: Option<f64>,
     /// Position of the animal in one frame: frame number and pixels, such as 120:310,95. The analysis follows
     /// the object at this point.
@@ -65,7 +65,7 @@ pub struct Args {
     /// 10,20,200,40@0-2.5. Repeatable.
     #[arg(long, value_name = "X,Y,W,H[@FROM-TO]")]
     ignore: Vec<String>,
-    #[arg(long, value_name = "R", help = set::parameter_help::<Params>("pixel_aspect"))]
+    #[arg(long, value_name = "R", value_parser = set::finite, help = set::parameter_help::<Params>("pixel_aspect"))]
     pixel_aspect: Option<f64>,
     #[arg(long, value_name = "F", help = set::parameter_help::<Params>("clip_frames"))]
     clip_frames: Option<u32>,
@@ -195,8 +195,8 @@ fn params_of(args: &Args) -> Result<Params, Error> {
     params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
 }
 
-/// Parses FRAME:X,Y.
-fn read_animal_at(text: &str) -> Result<Value, Error> {
+/// Parses FRAME:X,Y to the parameter `animal_at`.
+pub fn read_animal_at(text: &str) -> Result<Value, Error> {
     let parts = text.split_once(':').and_then(|(frame, point)| {
         let (x, y) = point.split_once(',')?;
         let frame: u32 = frame.trim().parse().ok()?;
@@ -210,8 +210,8 @@ fn read_animal_at(text: &str) -> Result<Value, Error> {
     Ok(json!({"frame": frame, "at_px": point}))
 }
 
-/// Parses X,Y,W,H or X,Y,W,H@FROM-TO.
-fn read_ignore(text: &str) -> Result<Value, Error> {
+/// Parses X,Y,W,H or X,Y,W,H@FROM-TO to an entry of the parameter `ignore`.
+pub fn read_ignore(text: &str) -> Result<Value, Error> {
     let wanted = || {
         let example = "10,20,200,40 or 10,20,200,40@0-2.5";
         Error::Usage(format!(
@@ -238,7 +238,7 @@ fn read_ignore(text: &str) -> Result<Value, Error> {
 }
 
 fn number(text: &str) -> Option<f64> {
-    text.trim().parse().ok()
+    set::finite(text.trim()).ok()
 }
 
 fn read_json(path: &Path) -> Result<Value, Error> {

@@ -19,7 +19,7 @@ const VARIABLE: &str = "FLOCKREEL_CONFIG";
 const CONFIG: &str = "config";
 
 /// Values by option id.
-type Settings = BTreeMap<String, String>;
+pub type Settings = BTreeMap<String, String>;
 
 /// Parses the arguments, with defaults from the settings file if there is one. Fails if the file is invalid.
 /// If the arguments are invalid or ask for help, clap prints a message and ends the process.
@@ -51,27 +51,28 @@ fn read(file: &Path) -> Result<Settings, Error> {
     let invalid = |what: &str| Error::Usage(format!("{what}: {}", file.display()));
     let text = std::fs::read_to_string(file);
     let text = text.map_err(|error| invalid(&format!("the settings cannot be read: {error}")))?;
+    settings_of_text(&text).map_err(|why| invalid(&why))
+}
+
+/// Returns the settings in the text of a file, by the ids of their options. Fails with the reason.
+pub fn settings_of_text(text: &str) -> Result<Settings, String> {
     let table: Table = (text.parse()).map_err(|error: toml::de::Error| {
         let line = text[..error.span().map_or(0, |span| span.start)]
             .matches('\n')
             .count()
             + 1;
-        invalid(&format!(
-            "line {line} is not valid TOML: {}",
-            error.message()
-        ))
+        format!("line {line} is not valid TOML: {}", error.message())
     })?;
     let known = settings_of(&Cli::command());
     let mut settings = Settings::new();
     for (key, value) in table {
         let id = key.replace('-', "_");
         let Some((flag, is_switch)) = known.get(&id) else {
-            return Err(invalid(&format!("the setting {key} is unknown, in")));
+            return Err(format!("the setting {key} is unknown, in"));
         };
         let text = to_text(&value, *is_switch);
-        let text =
-            text.ok_or_else(|| invalid(&format!("the value of {key} has the wrong type, in")))?;
-        check(flag, &text, *is_switch).map_err(|why| invalid(&format!("{key}: {why}, in")))?;
+        let text = text.ok_or_else(|| format!("the value of {key} has the wrong type, in"))?;
+        check(flag, &text, *is_switch).map_err(|why| format!("{key}: {why}, in"))?;
         settings.insert(id, text);
     }
     Ok(settings)

@@ -5,6 +5,7 @@
 //! for an internal failure.
 
 pub mod analyze;
+mod attempt;
 pub mod backup;
 pub mod check;
 pub mod check_plan;
@@ -18,7 +19,7 @@ pub mod matrix;
 pub mod progress;
 pub mod sample;
 pub mod serve;
-mod set;
+pub mod set;
 pub mod sprites;
 pub mod token;
 pub mod worker;
@@ -85,7 +86,8 @@ enum Command {
     Token(token::Args),
     /// Check the data folder: every file must match its row and hash, and every job must have a valid state.
     Check(check::Args),
-    /// Remove unused data: leftovers of crashes, and expired uploads, sessions and stored responses.
+    /// Remove unused data: leftovers of crashes, expired uploads, sessions and stored responses, and what is older than the
+    /// settings allow.
     Gc(gc::Args),
     /// Copy the data folder, even while a service uses it. To restore, run `serve --data` on the copy.
     Backup(backup::Args),
@@ -105,6 +107,9 @@ enum Command {
     Sample(sample::Args),
     /// Check whether this machine has everything that flockreel needs, and explain what is missing.
     Doctor(doctor::Args),
+    /// Compute one attempt at a job; a worker starts this command and gives the order on stdin.
+    #[command(hide = true)]
+    Attempt(attempt::Args),
 }
 
 /// Result of a command: the line of JSON that `--json` prints.
@@ -124,7 +129,7 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
     // Services log all their events, other commands only warnings.
     let default = if serves { "info" } else { "warn" };
     let _log = logging::start(cli.log.as_deref().unwrap_or(default), cli.log_format);
-    if serves {
+    if serves || matches!(cli.command, Command::Attempt(_)) {
         logging::log_panics();
     }
     media::configure(&cli.media);
@@ -156,6 +161,7 @@ fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
         Command::Sprites(args) => sprites::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Doctor(args) => doctor::run(args, json),
+        Command::Attempt(args) => attempt::run(args),
     }
 }
 

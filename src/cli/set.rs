@@ -10,7 +10,7 @@ use flockreel_core::parameters::{Parameters, Schemas};
 
 /// Overrides parameters with the values of `--set`. Fails where one has no `=`, or a name leads into a value that is
 /// not an object.
-pub(super) fn apply(settings: &[String], overrides: &mut Map<String, Value>) -> Result<(), Error> {
+pub fn apply(settings: &[String], overrides: &mut Map<String, Value>) -> Result<(), Error> {
     for setting in settings {
         let (name, value) = setting
             .split_once('=')
@@ -23,6 +23,13 @@ pub(super) fn apply(settings: &[String], overrides: &mut Map<String, Value>) -> 
         })?;
     }
     Ok(())
+}
+
+/// Parses a number. JSON has no infinity: a number such as 1e999 would become null, and so the default.
+pub(super) fn finite(text: &str) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_not_a_number| "not a number")?;
+    let too_large = || "the number must be finite".to_owned();
+    number.is_finite().then_some(number).ok_or_else(too_large)
 }
 
 /// Returns the help of `--set`, with an example of the command.
@@ -52,8 +59,12 @@ pub(super) fn parameter_help<P: Parameters>(name: &str) -> String {
         &schema["maximum"],
         &schema["exclusiveMinimum"],
     ) {
-        (min, max, _) if max.is_number() => help += &format!(" Limits: {min} to {max}."),
-        (_, _, min) if min.is_number() => help += &format!(" Above {min}."),
+        (min, max, _) if min.is_number() && max.is_number() => {
+            help += &format!(" Limits: {min} to {max}.");
+        }
+        (_, max, min) if min.is_number() && max.is_number() => {
+            help += &format!(" Above {min}, at most {max}.");
+        }
         _ => {}
     }
     let mut help = help.trim_end_matches('.').to_owned();
@@ -85,7 +96,10 @@ fn insert(fields: &mut Map<String, Value>, name: &str, value: Value) -> Option<(
 
 #[cfg(test)]
 mod tests {
+    use clap::CommandFactory;
+
     use super::*;
+    use crate::cli::Cli;
 
     fn applied(set: &[&str]) -> Result<Value, String> {
         let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
@@ -111,6 +125,29 @@ mod tests {
     }
 
     #[test]
+    fn infinite_number_is_no_default() {
+        assert_eq!(finite("2.5"), Ok(2.5));
+        for text in ["1e999", "inf", "-inf", "NaN", "", "1,5"] {
+            assert!(finite(text).is_err(), "{text}");
+        }
+        for line in [
+            "analyze a -o b --fps",
+            "analyze a -o b --pixel-aspect",
+            "analyze a -o b --from",
+            "analyze a -o b --to",
+            "analyze a -o b --animal-height 1 --animal-length",
+            "analyze a -o b --animal-length 1 --animal-height",
+            "flock a -o b --spacing",
+            "flock a -o b --haze",
+            "flock a -o b --shadow",
+        ] {
+            let line = format!("flockreel {line} 1e999");
+            let parsed = Cli::command().try_get_matches_from(line.split(' '));
+            assert!(parsed.unwrap_err().to_string().contains("finite"), "{line}");
+        }
+    }
+
+    #[test]
     fn help_of_a_flag_follows_from_the_parameter() {
         let help = parameter_help::<flockreel_core::flock::Params>("variation");
         assert!(help.contains("Limits: 0 to 0.3 [default: 0.05]"), "{help}");
@@ -125,6 +162,9 @@ mod tests {
             "{help}"
         );
         let help = parameter_help::<flockreel_core::analysis::Params>("kappa");
-        assert!(help.ends_with("Above 0 [default: 2.0]"), "{help}");
+        assert!(
+            help.ends_with("Above 0, at most 1000000 [default: 2.0]"),
+            "{help}"
+        );
     }
 }

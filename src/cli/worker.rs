@@ -4,18 +4,17 @@
 //! They share a PostgreSQL database and the stored files with a service, and communicate with it only through
 //! the queue.
 
-use std::time::Duration;
-
 use super::serve::{listen, wait_for_signal};
 use super::{Error, Summary};
 use crate::api;
 use crate::api::server::Stop;
-use crate::config::{Config, Database, JobSettings, Monitoring, Storage};
+use crate::config::{Config, Database, JobSettings, Monitoring, OwnerSpace, Storage};
 use crate::jobs::Context;
 use crate::jobs::supervisor::{Supervisor, recover};
 use crate::logging::say;
 use crate::media;
 use crate::store::Store;
+use crate::store::space::SpaceLimits;
 
 /// Arguments of `worker`.
 #[derive(Debug, clap::Args)]
@@ -24,6 +23,8 @@ pub struct Args {
     storage: Storage,
     #[command(flatten)]
     jobs: JobSettings,
+    #[command(flatten)]
+    owner_space: OwnerSpace,
     #[command(flatten)]
     monitoring: Monitoring,
 }
@@ -46,10 +47,13 @@ async fn work(args: Args) -> Result<(), Error> {
     }
     super::check_sandbox()?;
     media::tool_version()?;
-    let (n_workers, threads) = (args.jobs.workers.get(), args.jobs.threads_per_worker());
+    let n_workers = args.jobs.workers.get();
     let store = Store::open_beside(args.storage).await?;
-    let mut context = Context::new(store, threads);
-    context.budget = Duration::from_secs(args.jobs.job_time_s);
+    let store = store.with_space_limits(SpaceLimits {
+        max_owner_bytes: args.owner_space.max_owner_bytes,
+        ..SpaceLimits::default()
+    });
+    let mut context = Context::for_jobs(store, &args.jobs);
     context.min_free_bytes = Config::job_reserve_bytes(Config::DISK_RESERVE_BYTES);
     recover(&context).await?;
     let stop = Stop::default();

@@ -9,6 +9,7 @@ use super::{Context, Error, overlay};
 use crate::media::{Limits, ReadOptions, Video, read_image};
 use crate::store::footage::{Added, BACKGROUND, Footage, MASKS, POSTER, VIDEO};
 use crate::store::owners::Owner;
+use crate::store::space::Counted;
 use crate::store::{BlobFile, Draft, Store};
 use flockreel_core::footage::{FootageFormat, FrameSource};
 
@@ -26,12 +27,14 @@ pub struct ReceivedFiles {
     pub name: String,
     /// Owner of the footage.
     pub owner: Owner,
+    /// How the files count against the space of their owner until they are stored.
+    pub counted: Counted,
 }
 
 /// Checks the files and stores them. Returns the existing footage if the owner has already stored the same
 /// files. Waits for a permit of `upload_checks`; fails with [`Error::Busy`] if none becomes free.
 pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, Error> {
-    let permit = context.upload_checks.acquire().await?;
+    let permit = context.upload_checks.acquire(&received.owner).await?;
     let store = context.store.clone();
     let (received, format, poster) = tokio::task::spawn_blocking(move || {
         let _permit = permit;
@@ -48,7 +51,9 @@ pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, 
     files.extend(poster);
     footage.size_bytes = files.iter().map(|file| file.size_bytes).sum();
     let store = &context.store;
-    Ok(store.add_footage(footage, received.draft, &files).await?)
+    let upload = received.counted.upload();
+    let added = store.add_footage(footage, received.draft, &files, upload);
+    Ok(added.await?)
 }
 
 /// Checks the files without decoding the video. Returns the video.
@@ -96,6 +101,7 @@ fn footage_row(received: &ReceivedFiles, format: &FootageFormat) -> Footage {
     let background = received.background.as_ref();
     let sha256 = |file: Option<&BlobFile>| file.map_or(Vec::new(), |file| file.sha256.clone());
     let masks = received.masks.as_ref();
+    let now_ms = now_ms();
     Footage {
         id: Uuid::now_v7(),
         owner: received.owner.clone(),
@@ -110,7 +116,9 @@ fn footage_row(received: &ReceivedFiles, format: &FootageFormat) -> Footage {
         fps: format.fps,
         n_frames_hint: i64::try_from(format.n_frames_hint).unwrap_or(i64::MAX),
         sample: false,
-        created_ms: now_ms(),
+        pinned: false,
+        used_ms: now_ms,
+        created_ms: now_ms,
     }
 }
 
@@ -140,6 +148,7 @@ mod tests {
             masks: None,
             name: String::new(),
             owner: Owner::local(),
+            counted: Counted::Upload(Uuid::nil()),
         };
         let refused = admit(&context, received).await.unwrap_err();
         assert_eq!(refused.code(), flockreel_core::code::Code::Busy);

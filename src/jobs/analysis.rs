@@ -7,21 +7,19 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::decoding::Counted;
+use super::attempt::Counted;
+use super::lane::Extent;
 use super::masks::Masks;
-use super::{Attempt, Error, JobInput, Product, Stages, overlay, refusal};
+use super::{Attempt, Error, JobInput, Product, Stages, Subject, overlay, refusal};
 use crate::media::{Encoding, Limits, Notice, ReadOptions, Video, read_image, write_picture};
-use crate::store;
-use crate::store::footage::{BACKGROUND, Footage, MASKS, VIDEO};
+use crate::store::footage::{BACKGROUND, MASKS, VIDEO};
 use crate::store::jobs::Kind;
-use crate::store::jobs::finish::Source;
 use flockreel_core::analysis::similarity::distance::{ComparedSprites, Distances, Side};
 use flockreel_core::analysis::{self, Params, analyze};
 use flockreel_core::cpu;
 use flockreel_core::footage::{FrameSource, Part};
 use flockreel_core::formats::atlas::Atlas;
 use flockreel_core::formats::distance_map::DistanceMap;
-use flockreel_core::formats::library_json::FootageSummary;
 use flockreel_core::formats::{csv, library_dir, svg};
 use flockreel_core::ids::{FootageId, LibraryId};
 use flockreel_core::library::{Library, View};
@@ -95,27 +93,31 @@ impl JobInput for Input {
     const KIND: Kind = Kind::Analysis;
     type ResultId = LibraryId;
 
+    fn subject(&self) -> Option<Subject> {
+        Some(Subject::Footage(self.footage_id))
+    }
+
+    /// The film is decoded twice, and two films are encoded.
+    fn cost_px(&self, footage: Option<Extent>) -> Option<f64> {
+        Some(4.0 * footage?.film_px())
+    }
+
     fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
-        let footage = attempt.footage(self.footage_id)?;
         let limits = Limits {
-            threads: u32::try_from(attempt.threads).unwrap_or(0),
+            threads: u32::try_from(attempt.threads()).unwrap_or(0),
             ..Limits::default()
         };
-        let files = attempt.fetch(&footage.folder, &[VIDEO, BACKGROUND, MASKS])?;
-        let path_of = |name| files.path().join(name);
+        let given = |name| Some(attempt.subject_file(name)).filter(|path| path.exists());
         let options = read_options(&self.params);
-        let video = Video::open_with(&path_of(VIDEO), &limits, &options)?;
-        let given = (!footage.masks_sha256.is_empty()).then(|| path_of(MASKS));
-        let path = path_of(VIDEO);
-        let masks = Masks::open(&video, &path, given.as_deref(), &limits, &options)?;
+        let path = attempt.subject_file(VIDEO);
+        let video = Video::open_with(&path, &limits, &options)?;
+        let masks = Masks::open(&video, &path, given(MASKS).as_deref(), &limits, &options)?;
         let masked = masks.as_ref().map(|masks| masks.over(&video)).transpose()?;
-        let background = if footage.background_sha256.is_empty() {
-            None
-        } else {
-            Some(read_image(&path_of(BACKGROUND), &limits)?)
-        };
+        let background = given(BACKGROUND);
+        let background = background.map(|path| read_image(&path, &limits));
+        let background = background.transpose()?;
         let level = cpu::Level::detect();
-        let progress = attempt.listener;
+        let progress = attempt.reporter;
         let (background, scratch) = (background.as_ref(), attempt.scratch());
         let source: &dyn FrameSource = match &masked {
             Some(masked) => masked,
@@ -124,11 +126,11 @@ impl JobInput for Input {
         let film = Counted::new(source, progress);
         let library = analyze(&film, background, &self.params, level, &scratch, progress)
             .map_err(|cause| refusal::with_picture(source, cause))?;
-        self.write(attempt, &library, &footage)?;
+        self.write(attempt, &library)?;
         let part = Part::new(source, self.params.from_s, self.params.to_s);
         overlay::write_views(&part, &library.poses, attempt.folder(), progress)?;
         Ok(Product {
-            source: Source::Resource(self.footage_id.0),
+            film: None,
             params: serde_json::to_string(&self.params)?,
             summary: serde_json::to_string(&Summary::new(&library, &self.params, video.notices()))?,
         })
@@ -136,14 +138,10 @@ impl JobInput for Input {
 }
 
 impl Input {
-    fn write(&self, attempt: &Attempt, library: &Library, footage: &Footage) -> Result<(), Error> {
-        attempt.listener.report("writing", 0.0);
+    fn write(&self, attempt: &Attempt, library: &Library) -> Result<(), Error> {
+        attempt.reporter.report("writing", 0.0);
         let folder = attempt.folder();
-        let source = FootageSummary {
-            sha256: store::blobs::hex(&footage.sha256),
-            n_bytes: footage.size_bytes.unsigned_abs(),
-        };
-        library_dir::write(folder, library, &self.params, &source)?;
+        library_dir::write(folder, library, &self.params, attempt.footage()?)?;
         std::fs::write(folder.join("poses.csv"), csv::write_poses(&library.poses))?;
         for (name, picture) in svg::pictures(library) {
             std::fs::write(folder.join(name), picture)?;
@@ -166,7 +164,7 @@ impl Input {
             side: Side::Plain,
             cpu: cpu::Level::detect(),
         };
-        DistanceMap::compute(&distances, library, attempt.listener)
+        DistanceMap::compute(&distances, library, attempt.reporter)
             .map_err(|_cancelled| Error::Cancelled)
     }
 }

@@ -1,13 +1,16 @@
-//! Limits of simultaneous work on behalf of waiting requests (docs/explanation/promises.md, "Overload"). If
-//! no permit becomes free in time, the request is refused before its work starts.
+//! Limits of simultaneous work on behalf of waiting requests (docs/explanation/promises.md, "Overload").
+//! Owners take turns, so an owner with one request does not wait for all requests of another. If no permit
+//! becomes free in time, the request is refused before its work starts.
 
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::oneshot;
 use tokio::time::timeout;
 
 use super::Error;
+use crate::store::owners::Owner;
 
 /// Maximum wait for a permit. Free choice.
 const MAX_WAIT: Duration = Duration::from_secs(20);
@@ -15,15 +18,35 @@ const MAX_WAIT: Duration = Duration::from_secs(20);
 /// A limited number of permits. Clones share them.
 #[derive(Clone, Debug)]
 pub struct ConcurrencyLimit {
-    permits: Arc<Semaphore>,
+    line: Arc<Mutex<Line>>,
     max_wait: Duration,
+}
+
+/// Permission to work. Dropping it passes it on.
+#[derive(Debug)]
+pub(super) struct Permit {
+    /// `None` once the permit has been passed on.
+    line: Option<Arc<Mutex<Line>>>,
+}
+
+/// The free permits, and those who wait.
+#[derive(Debug)]
+struct Line {
+    n_free: usize,
+    /// Owners in the order of their turns, each with its requests in the order of their arrival. No owner is
+    /// listed twice.
+    owners: VecDeque<(Owner, VecDeque<oneshot::Sender<Permit>>)>,
 }
 
 impl ConcurrencyLimit {
     /// Returns a limit of `n` permits. `max_wait` is the maximum wait for one.
     pub(super) fn new(n: usize, max_wait: Duration) -> ConcurrencyLimit {
+        let line = Line {
+            n_free: n,
+            owners: VecDeque::new(),
+        };
         ConcurrencyLimit {
-            permits: Arc::new(Semaphore::new(n)),
+            line: Arc::new(Mutex::new(line)),
             max_wait,
         }
     }
@@ -39,23 +62,114 @@ impl ConcurrencyLimit {
         ConcurrencyLimit::new(1, MAX_WAIT)
     }
 
-    /// Waits for a permit, which is returned when dropped. Fails with [`Error::Busy`] after the maximum wait.
-    pub(super) async fn acquire(&self) -> Result<OwnedSemaphorePermit, Error> {
-        let permit = timeout(self.max_wait, self.permits.clone().acquire_owned());
-        permit.await.ok().and_then(Result::ok).ok_or(Error::Busy)
+    /// Waits for a permit, which is passed on when dropped. Fails with [`Error::Busy`] after the maximum wait.
+    pub(super) async fn acquire(&self, owner: &Owner) -> Result<Permit, Error> {
+        let turn = {
+            let mut line = locked(&self.line);
+            if line.n_free > 0 {
+                line.n_free -= 1;
+                return Ok(Permit {
+                    line: Some(self.line.clone()),
+                });
+            }
+            let (sender, turn) = oneshot::channel();
+            line.add(owner, sender);
+            turn
+        };
+        let permit = timeout(self.max_wait, turn).await;
+        permit.ok().and_then(Result::ok).ok_or(Error::Busy)
     }
+}
+
+impl Line {
+    fn add(&mut self, owner: &Owner, sender: oneshot::Sender<Permit>) {
+        match self.owners.iter_mut().find(|(other, _)| other == owner) {
+            Some((_, requests)) => {
+                requests.retain(|request| !request.is_closed());
+                requests.push_back(sender);
+            }
+            None => (self.owners).push_back((owner.clone(), VecDeque::from([sender]))),
+        }
+    }
+
+    /// Takes the next request, and puts its owner at the end of the line.
+    fn next(&mut self) -> Option<oneshot::Sender<Permit>> {
+        loop {
+            let (owner, mut requests) = self.owners.pop_front()?;
+            let Some(request) = requests.pop_front() else {
+                continue;
+            };
+            if !requests.is_empty() {
+                self.owners.push_back((owner, requests));
+            }
+            return Some(request);
+        }
+    }
+}
+
+impl Drop for Permit {
+    fn drop(&mut self) {
+        let Some(shared) = self.line.take() else {
+            return;
+        };
+        let mut line = locked(&shared);
+        let mut permit = Permit {
+            line: Some(shared.clone()),
+        };
+        while let Some(request) = line.next() {
+            match request.send(permit) {
+                Ok(()) => return,
+                // The request has given up.
+                Err(unused) => permit = unused,
+            }
+        }
+        permit.line = None;
+        line.n_free += 1;
+    }
+}
+
+fn locked(line: &Mutex<Line>) -> MutexGuard<'_, Line> {
+    line.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn owner(name: &str) -> Owner {
+        Owner(name.to_owned())
+    }
+
     #[tokio::test]
     async fn acquiring_times_out_while_all_permits_are_taken_and_succeeds_after_release() {
         let limit = ConcurrencyLimit::new(1, Duration::from_millis(20));
-        let first = limit.acquire().await.unwrap();
-        assert!(matches!(limit.acquire().await, Err(Error::Busy)));
+        let first = limit.acquire(&owner("a")).await.unwrap();
+        assert!(matches!(limit.acquire(&owner("a")).await, Err(Error::Busy)));
         drop(first);
-        assert!(limit.acquire().await.is_ok());
+        let second = limit.acquire(&owner("a")).await.unwrap();
+        drop(second);
+        assert_eq!(locked(&limit.line).n_free, 1);
+    }
+
+    #[tokio::test]
+    async fn one_request_waits_only_for_one_turn_of_another_owner() {
+        let limit = ConcurrencyLimit::new(1, Duration::from_secs(60));
+        let first = limit.acquire(&owner("a")).await.unwrap();
+        let order = Arc::new(Mutex::new(Vec::new()));
+        let mut tasks = Vec::new();
+        for name in ["a", "a", "a", "b", "a"] {
+            let (limit, order) = (limit.clone(), order.clone());
+            tasks.push(tokio::spawn(async move {
+                let _permit = limit.acquire(&owner(name)).await.unwrap();
+                order.lock().unwrap().push(name);
+            }));
+            // Every task waits in the line before the next one starts.
+            tokio::task::yield_now().await;
+        }
+        drop(first);
+        for task in tasks {
+            task.await.unwrap();
+        }
+        assert_eq!(*order.lock().unwrap(), ["a", "b", "a", "a", "a"]);
     }
 }

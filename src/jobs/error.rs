@@ -1,5 +1,7 @@
 //! Errors of jobs: why a job failed, with the stable code of each reason.
 
+use std::process::ExitStatus;
+
 use crate::{media, store};
 use flockreel_core::code::Code;
 use flockreel_core::footage::SourceError;
@@ -53,6 +55,15 @@ pub enum Error {
     /// The computation panicked.
     #[error("the computation stopped unexpectedly")]
     Panicked,
+    /// The process of the attempt reported an error.
+    #[error("{}", .0.sentence)]
+    Attempt(FailedAttempt),
+    /// The process of the attempt reached the limit of its memory.
+    #[error("the job needs more memory than its limit")]
+    MemoryLimit,
+    /// The process of the attempt died by itself, or was killed from outside.
+    #[error("the process of the job crashed: {0}")]
+    Crashed(ExitStatus),
     /// The job exceeded its time limit.
     #[error("the job exceeded its time limit")]
     TimeLimit,
@@ -65,6 +76,19 @@ pub enum Error {
     /// A user cancelled the job, or the process is stopping.
     #[error("the job was cancelled")]
     Cancelled,
+}
+
+/// An error that the process of an attempt reported.
+#[derive(Debug)]
+pub struct FailedAttempt {
+    /// Stable code.
+    pub code: Code,
+    /// Description for people.
+    pub sentence: String,
+    /// Whether another attempt may succeed.
+    pub is_transient: bool,
+    /// The frames that show the reason, JPEG.
+    pub picture: Option<Vec<u8>>,
 }
 
 impl Error {
@@ -83,6 +107,9 @@ impl Error {
             Error::Store(error) => error.code(),
             Error::Io(error) => code_of_io(error),
             Error::Panicked => Code::Internal,
+            Error::Attempt(failed) => failed.code,
+            Error::MemoryLimit => Code::MemoryLimit,
+            Error::Crashed(_) => Code::CrashedWorker,
             Error::TimeLimit => Code::TimeLimit,
             Error::DiskFull => Code::StorageFull,
             Error::Busy => Code::Busy,
@@ -94,26 +121,33 @@ impl Error {
     pub fn picture(&self) -> Option<&[u8]> {
         match self {
             Error::Refused { picture, .. } => Some(picture),
+            Error::Attempt(failed) => failed.picture.as_deref(),
             _ => None,
         }
     }
 
     /// Returns whether another attempt may succeed. True for errors of the file system, the database and the
-    /// start of media tools; false for bad input, a full disk and panics.
+    /// start of media tools, and for tools that were killed from outside; false for bad input, a full disk and
+    /// panics.
     pub fn is_transient(&self) -> bool {
         match self {
-            Error::Store(_) | Error::Io(_) | Error::Media(media::Error::Io { .. }) => {
-                self.code() == Code::Internal
+            Error::Attempt(failed) => failed.is_transient,
+            Error::Media(error) => is_transient_in_media(error),
+            Error::Source(error) | Error::Analysis(analysis::Error::Source(error)) => {
+                let cause = error.cause.downcast_ref();
+                cause.is_some_and(is_transient_in_media)
             }
-            Error::Source(error) => {
-                matches!(error.cause.downcast_ref(), Some(media::Error::Io { .. }))
-            }
+            Error::Store(_) | Error::Io(_) => self.code() == Code::Internal,
             Error::LibraryDir(formats::library_dir::Error::Io { .. }) => {
                 self.code() == Code::Internal
             }
             _ => false,
         }
     }
+}
+
+fn is_transient_in_media(error: &media::Error) -> bool {
+    matches!(error, media::Error::Io { .. } | media::Error::Killed)
 }
 
 fn code_of_library_dir(error: &formats::library_dir::Error) -> Code {
@@ -135,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn failed_start_of_a_tool_is_transient_and_bad_input_is_not() {
+    fn failed_start_or_kill_of_a_tool_is_transient_and_bad_input_is_not() {
         let io = |kind: std::io::ErrorKind| media::Error::Io {
             doing: "starting the media tool",
             source: kind.into(),
@@ -143,6 +177,8 @@ mod tests {
         let busy = || io(std::io::ErrorKind::WouldBlock);
         assert!(Error::Media(busy()).is_transient());
         assert!(Error::Source(busy().into()).is_transient());
+        let killed = analysis::Error::Source(media::Error::Killed.into());
+        assert!(Error::Analysis(killed).is_transient());
         for error in [media::Error::TimeLimit, media::Error::NoVideoStream] {
             assert!(!Error::Source(error.into()).is_transient());
         }

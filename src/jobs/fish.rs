@@ -5,10 +5,10 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::{Attempt, Error, JobInput, Product, Stages};
+use super::lane::Extent;
+use super::{Attempt, Error, JobInput, Product, Stages, Subject};
 use crate::media::{VideoFormat, VideoWriter};
 use crate::store::jobs::Kind;
-use crate::store::jobs::finish::Source;
 use flockreel_core::fish::{Film, Params, drive};
 use flockreel_core::formats::glb;
 use flockreel_core::ids::{FishId, LibraryId};
@@ -45,8 +45,16 @@ impl JobInput for Input {
     const KIND: Kind = Kind::Fish;
     type ResultId = FishId;
 
+    fn subject(&self) -> Option<Subject> {
+        Some(Subject::Library(self.library_id))
+    }
+
+    fn cost_px(&self, library: Option<Extent>) -> Option<f64> {
+        Some(library?.film_px())
+    }
+
     fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
-        let library = attempt.library(self.library_id)?;
+        let library = attempt.library()?;
         let motion = drive(&library.poses, &self.params)?;
         std::fs::write(attempt.folder().join("model.glb"), glb::write(&motion))?;
         let summary = Summary {
@@ -61,7 +69,7 @@ impl JobInput for Input {
         };
         render(attempt, &Film::new(motion, library.background))?;
         Ok(Product {
-            source: Source::Resource(self.library_id.0),
+            film: None,
             params: serde_json::to_string(&self.params)?,
             summary: serde_json::to_string(&summary)?,
         })
@@ -80,13 +88,13 @@ fn render(attempt: &Attempt, film: &Film) -> Result<(), Error> {
     let mut video = VideoWriter::create(&attempt.folder().join("video.mp4"), &format)?;
     let mut frame = Frame::default();
     for frame_idx in 0..motion.frames.len() {
-        if attempt.listener.cancelled() {
+        if attempt.reporter.cancelled() {
             return Err(Error::Cancelled);
         }
         film.render(frame_idx, &mut frame);
         video.write(&frame)?;
         let fraction = (frame_idx + 1) as f64 / motion.frames.len() as f64;
-        attempt.listener.report("rendering", fraction);
+        attempt.reporter.report("rendering", fraction);
     }
     Ok(video.finish()?)
 }

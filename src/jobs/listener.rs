@@ -1,12 +1,11 @@
-//! Communication between a running computation and its worker. The computation reports its progress and asks
-//! whether to stop. The worker reads the progress, cancels, and finally reads the times of the stages. Both
-//! sides are cheap; the worker decides how often it writes to the database.
+//! Communication between a worker and the task that follows the process of its job. The task passes on progress
+//! and learns when to stop. The worker decides how often progress is written to the database, and reads the times
+//! of the stages at the end.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use flockreel_core::progress::Progress;
+use tokio_util::sync::{CancellationToken, WaitForCancellationFuture};
 
 /// Stages of a kind of job, in order, with the share of the running time of each. The shares add up to 1.
 pub type Stages = &'static [(&'static str, f64)];
@@ -20,13 +19,18 @@ pub struct Position {
     pub progress: f64,
 }
 
-/// Progress and cancellation of one computation.
-#[derive(Debug)]
+/// Progress and cancellation of one computation. Clones share them.
+#[derive(Clone, Debug)]
 pub struct Listener {
     stages: Stages,
-    cancelled: AtomicBool,
-    position: Mutex<Position>,
-    times: Mutex<Times>,
+    stop: CancellationToken,
+    state: Arc<Mutex<State>>,
+}
+
+#[derive(Debug)]
+struct State {
+    position: Position,
+    times: Times,
 }
 
 /// Time spent in past stages, start of the current one, and statistics of decoding.
@@ -41,90 +45,101 @@ struct Times {
 impl Listener {
     /// Returns the listener of a computation with these stages.
     pub fn new(stages: Stages) -> Listener {
-        Listener {
-            stages,
-            cancelled: AtomicBool::new(false),
-            position: Mutex::new(Position {
+        let state = State {
+            position: Position {
                 stage: "starting",
                 progress: 0.0,
-            }),
-            times: Mutex::new(Times {
+            },
+            times: Times {
                 past: Vec::new(),
                 since: Instant::now(),
                 n_decoded: 0,
                 decoding: Duration::ZERO,
-            }),
+            },
+        };
+        Listener {
+            stages,
+            stop: CancellationToken::new(),
+            state: Arc::new(Mutex::new(state)),
         }
     }
 
-    /// Asks the computation to stop at the next convenient point.
+    /// Asks the computation to stop.
     pub fn cancel(&self) {
-        self.cancelled.store(true, Ordering::Relaxed);
+        self.stop.cancel();
+    }
+
+    /// Returns whether the computation was asked to stop.
+    pub fn is_cancelled(&self) -> bool {
+        self.stop.is_cancelled()
+    }
+
+    /// Waits until the computation is asked to stop.
+    pub fn stopped(&self) -> WaitForCancellationFuture<'_> {
+        self.stop.cancelled()
+    }
+
+    /// Takes note of the current stage, and of the completed share of it. A stage of no table is ignored.
+    pub fn report(&self, stage: &str, fraction: f64) {
+        let Some((stage, progress)) = self.overall(stage, fraction) else {
+            return;
+        };
+        let mut state = self.state();
+        if state.position.stage != stage {
+            let before = state.position.stage;
+            state.times.end_stage(before);
+        }
+        state.position = Position {
+            stage,
+            progress: state.position.progress.max(progress).min(1.0),
+        };
     }
 
     /// Returns the position of the computation.
     pub fn position(&self) -> Position {
-        // The position is written as a whole, so a panic cannot leave it incomplete.
-        *self
-            .position
-            .lock()
-            .unwrap_or_else(|broken| broken.into_inner())
+        self.state().position
     }
 
     /// Returns the time spent in each stage so far. Only the stages of the job are included.
     pub fn stage_times(&self) -> Vec<(&'static str, Duration)> {
-        let under_way = self.position().stage;
-        let times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut all = times.past.clone();
-        add(&mut all, under_way, times.since.elapsed());
+        let state = self.state();
+        let mut all = state.times.past.clone();
+        add(&mut all, state.position.stage, state.times.since.elapsed());
         all.retain(|(stage, _)| self.stages.iter().any(|(name, _)| name == stage));
         all
     }
 
     /// Adds decoded frames and the time that they took.
     pub fn count_decoded(&self, n_frames: u64, took: Duration) {
-        let mut times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
+        let times = &mut self.state().times;
         times.n_decoded += n_frames;
         times.decoding += took;
     }
 
     /// Returns the number of decoded frames and the time that they took.
     pub fn decoded(&self) -> (u64, Duration) {
-        let times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
+        let times = &self.state().times;
         (times.n_decoded, times.decoding)
     }
 
-    fn end_stage(&self, stage: &'static str) {
-        let mut times = self.times.lock().unwrap_or_else(PoisonError::into_inner);
-        let took = times.since.elapsed();
-        add(&mut times.past, stage, took);
-        times.since = Instant::now();
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Every change is complete in itself, so a panic cannot leave half of one.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the completed share of the job at a fraction of a stage; `None` for an unknown stage.
-    fn overall(&self, stage: &str, fraction: f64) -> Option<f64> {
+    /// Returns the stage, and the completed share of the job at a fraction of it; `None` for an unknown stage.
+    fn overall(&self, stage: &str, fraction: f64) -> Option<(&'static str, f64)> {
         let at = self.stages.iter().position(|(name, _)| *name == stage)?;
         let before: f64 = self.stages[..at].iter().map(|(_, share)| share).sum();
-        Some(before + self.stages[at].1 * fraction.clamp(0.0, 1.0))
+        let (stage, share) = self.stages[at];
+        Some((stage, before + share * fraction.clamp(0.0, 1.0)))
     }
 }
 
-impl Progress for Listener {
-    fn report(&self, stage: &'static str, fraction: f64) {
-        let overall = self.overall(stage, fraction);
-        let mut position = self
-            .position
-            .lock()
-            .unwrap_or_else(|broken| broken.into_inner());
-        if position.stage != stage {
-            self.end_stage(position.stage);
-        }
-        position.stage = stage;
-        position.progress = position.progress.max(overall.unwrap_or(0.0)).min(1.0);
-    }
-
-    fn cancelled(&self) -> bool {
-        self.cancelled.load(Ordering::Relaxed)
+impl Times {
+    fn end_stage(&mut self, stage: &'static str) {
+        add(&mut self.past, stage, self.since.elapsed());
+        self.since = Instant::now();
     }
 }
 

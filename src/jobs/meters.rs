@@ -13,6 +13,7 @@ use prometheus_client::registry::Registry;
 use super::listener::Listener;
 use super::worker::Step;
 use crate::store::jobs::Kind;
+use crate::store::upkeep::retention::Retired;
 
 /// Upper limits of the histogram buckets for stages, seconds. They cover short and long videos.
 const JOB_S: [f64; 11] = [
@@ -30,6 +31,11 @@ struct Ended {
 }
 
 #[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Noun {
+    noun: &'static str,
+}
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
 struct Stage {
     kind: &'static str,
     stage: &'static str,
@@ -44,6 +50,7 @@ pub struct Meters {
     stages: Times,
     decoded: Counter,
     decode_fps: Arc<Histogram>,
+    retired: Family<Noun, Counter>,
 }
 
 impl Default for Meters {
@@ -53,6 +60,7 @@ impl Default for Meters {
             stages: Family::new_with_constructor(|| Histogram::new(JOB_S)),
             decoded: Counter::default(),
             decode_fps: Arc::new(Histogram::new(DECODE_FPS)),
+            retired: Family::default(),
         }
     }
 }
@@ -80,6 +88,20 @@ impl Meters {
             "Decoding rate of the films of analyses",
             (*self.decode_fps).clone(),
         );
+        registry.register(
+            "flockreel_retention_deletes",
+            "Resources and jobs deleted because of their age",
+            self.retired.clone(),
+        );
+    }
+
+    /// Counts data that was deleted because of its age.
+    pub(super) fn count_retired(&self, retired: &Retired) {
+        let resources = retired.resources.iter();
+        let counts = resources.map(|(kind, amount)| (kind.plural(), amount.n.unsigned_abs()));
+        for (noun, n) in counts.chain([("jobs", retired.n_jobs)]) {
+            self.retired.get_or_create(&Noun { noun }).inc_by(n);
+        }
     }
 
     /// Counts a completed attempt.
@@ -118,7 +140,6 @@ mod tests {
     use super::*;
     use flockreel_core::code::Code;
     use flockreel_core::ids::JobId;
-    use flockreel_core::progress::Progress;
 
     #[test]
     fn attempt_is_counted_with_its_stages_and_frames() {

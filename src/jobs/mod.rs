@@ -1,19 +1,19 @@
 //! Jobs: the kinds of work in the queue, and the workers that run them
 //! (docs/explanation/promises.md, "No job is lost").
 //!
-//! The kinds are a closed enum. The `run` of a job is a plain function on a blocking thread. It loads its
-//! input, computes, and leaves files in its draft; the worker stores them. A job may run twice, and only one
-//! of the results is kept.
+//! The kinds are a closed enum. The `run` of a job is a plain function in a child process. It loads its input,
+//! computes, and leaves files in a folder; the worker stores them. A job may run twice, and only one of the results
+//! is kept.
 
 // How jobs are run.
-pub mod attempt; // input and output of one attempt
+pub mod attempt; // one attempt, in a child process
 pub mod id_sequence; // ids for idempotent requests
 pub mod listener; // progress and cancellation
 pub mod meters; // metrics
 pub mod supervisor; // start of workers, rescue of jobs, graceful stop
 pub mod worker; // claim, run and finish one job
 
-mod decoding; // metrics of decoding
+mod lane; // small jobs
 
 // The kinds of jobs, and related computations.
 pub mod admit; // received files -> footage
@@ -30,6 +30,8 @@ pub mod synchronous; // library -> computations during a request
 pub mod clock;
 pub mod error;
 
+use std::ffi::OsString;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -46,24 +48,33 @@ pub use id_sequence::IdSequence;
 pub use listener::{Listener, Stages};
 pub use meters::Meters;
 
-use crate::config::JobSettings;
+use crate::config::{JobSettings, Retention};
+use crate::store::jobs::Kind;
 use crate::store::jobs::enqueue::NewJob;
-use crate::store::jobs::{Kind, Lease};
-use crate::store::owners::Account;
+use crate::store::jobs::retry::Retry;
+use crate::store::owners::{Account, OwnerFilter};
 use crate::store::{self, Store};
-use flockreel_core::ids::JobId;
+use flockreel_core::ids::{FootageId, JobId, LibraryId};
+use lane::Extent;
 
 /// Data shared by workers. Smaller than the state of the API.
 #[derive(Clone)]
 pub struct Context {
     /// The store.
     pub store: Store,
-    /// Wakes an idle worker when a job is queued.
+    /// Wakes the idle workers when a job is queued.
     pub wake: Arc<Notify>,
     /// Cancelled when the process stops. Workers then claim no jobs, and running jobs return to the queue.
     pub draining: CancellationToken,
+    /// Id of this process, by which its jobs are told from those of others. Random, so that a restarted process has
+    /// another one.
+    pub process: Uuid,
+    /// Program of an attempt, and its arguments before `attempt`.
+    pub attempt_program: (PathBuf, Vec<OsString>),
     /// Number of threads that one job may use.
     pub threads: usize,
+    /// Limit of the memory of one attempt, without its media tools, bytes.
+    pub memory_bytes: u64,
     /// Duration of a lease without a heartbeat.
     pub lease: Duration,
     /// Time limit of one attempt at a job.
@@ -72,6 +83,8 @@ pub struct Context {
     pub sweep_every: Duration,
     /// Maximum number of queued and running jobs of all owners.
     pub max_queued: i64,
+    /// Ages at which data is deleted.
+    pub retention: Retention,
     /// Free disk space below which jobs are stopped, bytes. It keeps space for the database.
     pub min_free_bytes: u64,
     /// Metrics of the jobs of this process.
@@ -114,11 +127,36 @@ impl Context {
             result_id,
             after_job,
             priority: 0,
+            is_small: self.is_small(input).await?,
             max_queued: self.max_queued,
         };
         self.store.enqueue(&job, self.now_ms().await?).await?;
-        self.wake.notify_one();
+        self.wake.notify_waiters();
         Ok((job_id, result_id.into()))
+    }
+
+    /// Returns a job that failed or was cancelled to the queue.
+    pub async fn retry(
+        &self,
+        job: JobId,
+        owners: &OwnerFilter,
+        account: &Account,
+    ) -> Result<Retry, store::Error> {
+        let (store, now_ms) = (&self.store, self.now_ms().await?);
+        let retry = store
+            .retry(job, owners, account, self.max_queued, now_ms)
+            .await?;
+        self.wake.notify_waiters();
+        Ok(retry)
+    }
+
+    /// Returns a context with these settings of jobs.
+    pub fn for_jobs(store: Store, settings: &JobSettings) -> Context {
+        Context {
+            budget: Duration::from_secs(settings.job_time_s),
+            memory_bytes: settings.job_memory_bytes,
+            ..Context::new(store, settings.threads_per_worker())
+        }
     }
 
     /// Returns a context with default settings.
@@ -127,15 +165,39 @@ impl Context {
             store,
             wake: Arc::new(Notify::new()),
             draining: CancellationToken::new(),
+            process: Uuid::now_v7(),
+            // This program, even if its file was replaced.
+            attempt_program: (PathBuf::from("/proc/self/exe"), Vec::new()),
             threads,
+            memory_bytes: JobSettings::JOB_MEMORY_BYTES,
             lease: Duration::from_secs(15),
             budget: Duration::from_secs(JobSettings::JOB_TIME_S),
             sweep_every: Duration::from_secs(3600),
             max_queued: i64::MAX,
+            retention: Retention::default(),
             min_free_bytes: 0,
             meters: Meters::default(),
             upload_checks: ConcurrencyLimit::per_core(),
             synchronous_work: ConcurrencyLimit::one(),
+        }
+    }
+}
+
+/// Footage or library that a job works on.
+#[derive(Clone, Copy, Debug)]
+pub enum Subject {
+    /// Footage.
+    Footage(FootageId),
+    /// Library.
+    Library(LibraryId),
+}
+
+impl Subject {
+    /// Returns the id of the footage or library.
+    pub fn id(self) -> Uuid {
+        match self {
+            Subject::Footage(id) => id.0,
+            Subject::Library(id) => id.0,
         }
     }
 }
@@ -147,22 +209,39 @@ pub trait JobInput: Serialize + DeserializeOwned {
     /// Type of the id of the result.
     type ResultId: From<Uuid>;
 
-    /// Makes the result on the calling thread, and leaves its files in the folder of the attempt.
+    /// Returns what the job works on, if anything.
+    fn subject(&self) -> Option<Subject>;
+
+    /// Estimates the cost of the job: the number of pixels that are decoded, drawn and encoded. `None` if that depends
+    /// on an unknown subject. `subject` is the extent of the footage, or of that of the library.
+    fn cost_px(&self, subject: Option<Extent>) -> Option<f64>;
+
+    /// Makes the result in the process of an attempt, and leaves its files in the folder of the attempt.
     fn run(&self, attempt: &Attempt) -> Result<Product, Error>;
 }
 
-/// Runs a claimed job on the calling thread.
-pub fn run(lease: &Lease, attempt: &Attempt) -> Result<Product, Error> {
-    match lease.kind {
-        Kind::Sample => run_input::<sample::Input>(lease, attempt),
-        Kind::Analysis => run_input::<analysis::Input>(lease, attempt),
-        Kind::Flock => run_input::<flock::Input>(lease, attempt),
-        Kind::Fish => run_input::<fish::Input>(lease, attempt),
+/// Runs a job of this kind with its input (JSON) on the calling thread.
+fn run(kind: Kind, input: &str, attempt: &Attempt) -> Result<Product, Error> {
+    match kind {
+        Kind::Sample => parse::<sample::Input>(input)?.run(attempt),
+        Kind::Analysis => parse::<analysis::Input>(input)?.run(attempt),
+        Kind::Flock => parse::<flock::Input>(input)?.run(attempt),
+        Kind::Fish => parse::<fish::Input>(input)?.run(attempt),
     }
 }
 
-fn run_input<Input: JobInput>(lease: &Lease, attempt: &Attempt) -> Result<Product, Error> {
-    serde_json::from_str::<Input>(&lease.input)?.run(attempt)
+/// Returns what a job of this kind with this input (JSON) works on, if anything.
+fn subject(kind: Kind, input: &str) -> Result<Option<Subject>, Error> {
+    Ok(match kind {
+        Kind::Sample => parse::<sample::Input>(input)?.subject(),
+        Kind::Analysis => parse::<analysis::Input>(input)?.subject(),
+        Kind::Flock => parse::<flock::Input>(input)?.subject(),
+        Kind::Fish => parse::<fish::Input>(input)?.subject(),
+    })
+}
+
+fn parse<Input: JobInput>(input: &str) -> Result<Input, Error> {
+    Ok(serde_json::from_str(input)?)
 }
 
 /// Returns the stages of a kind of job.

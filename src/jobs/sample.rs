@@ -5,14 +5,16 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::attempt::Film;
+use super::lane::Extent;
 use super::{
-    Attempt, Context, Error, IdSequence, JobInput, Product, Stages, analysis, flock, overlay,
+    Attempt, Context, Error, IdSequence, JobInput, Product, Stages, Subject, analysis, flock,
+    overlay,
 };
 use crate::media::VideoWriter;
 use crate::store;
-use crate::store::footage::{Footage, SampleFootage, VIDEO};
+use crate::store::footage::{Footage, VIDEO};
 use crate::store::jobs::Kind;
-use crate::store::jobs::finish::Source;
 use crate::store::owners::{Account, OwnerFilter};
 use flockreel_core::fish::sample::{SampleFilm, SampleParams};
 use flockreel_core::footage::FrameSource;
@@ -22,6 +24,9 @@ use flockreel_core::raster::Frame;
 
 /// Stages with their share of the running time.
 pub const STAGES: Stages = &[("filming", 1.0)];
+
+/// Name of the footage.
+pub(super) const FILM_NAME: &str = "sample.mp4";
 
 /// Input of the sample.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -69,21 +74,30 @@ impl JobInput for Input {
     const KIND: Kind = Kind::Sample;
     type ResultId = FootageId;
 
-    fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
-        let film = SampleFilm::new(SampleParams {
+    fn subject(&self) -> Option<Subject> {
+        None
+    }
+
+    fn cost_px(&self, _: Option<Extent>) -> Option<f64> {
+        let SampleParams { width, height, .. } = self.params();
+        let film = Extent {
             n_frames: self.n_frames,
-            ..SampleParams::default()
-        })?;
+            image_size_px: [width, height],
+        };
+        Some(film.film_px())
+    }
+
+    fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
+        let film = SampleFilm::new(self.params())?;
         let path = attempt.folder().join(VIDEO);
         // The extension of the path selects the container.
         let written = path.with_extension("mp4");
-        write(&film, &written, attempt.listener)?;
+        write(&film, &written, attempt.reporter)?;
         std::fs::rename(&written, &path)?;
         overlay::write_poster(&film, attempt.folder())?;
         let format = film.format();
         Ok(Product {
-            source: Source::Sample(SampleFootage {
-                name: "sample.mp4",
+            film: Some(Film {
                 width: format.width,
                 height: format.height,
                 fps: format.fps,
@@ -92,6 +106,15 @@ impl JobInput for Input {
             params: String::new(),
             summary: String::new(),
         })
+    }
+}
+
+impl Input {
+    fn params(&self) -> SampleParams {
+        SampleParams {
+            n_frames: self.n_frames,
+            ..SampleParams::default()
+        }
     }
 }
 

@@ -10,6 +10,7 @@ use tokio_util::sync::CancellationToken;
 use uuid::Uuid;
 
 use super::{Context, Error};
+use crate::store::owners::Owner;
 use crate::store::resources::Library;
 use crate::store::{Draft, Spill};
 use flockreel_core::analysis::similarity::distance::{
@@ -35,6 +36,7 @@ pub struct Preview {
 /// Simulates and plans a flock. Its file has the format that `write` makes.
 pub async fn preview_flock(
     context: &Context,
+    owner: &Owner,
     library: &Library,
     params: Params,
     write: fn(&Flock) -> Vec<u8>,
@@ -51,11 +53,15 @@ pub async fn preview_flock(
             writing,
         })
     };
-    compute(context, library, plan).await
+    compute(context, owner, library, plan).await
 }
 
 /// Computes the distances between all clips of a library. Returns an unnamed file with the `distance.npy`.
-pub async fn distance_file(context: &Context, library: &Library) -> Result<File, Error> {
+pub async fn distance_file(
+    context: &Context,
+    owner: &Owner,
+    library: &Library,
+) -> Result<File, Error> {
     let write = |stored: StoredLibrary, draft: &Draft, cancellation: &Cancellation| {
         let library = stored.library;
         npy::check(library.sprites.n_frames())?;
@@ -80,16 +86,18 @@ pub async fn distance_file(context: &Context, library: &Library) -> Result<File,
             .into_inner()
             .map_err(std::io::IntoInnerError::into_error)?)
     };
-    compute(context, library, write).await
+    compute(context, owner, library, write).await
 }
 
-/// Runs a computation on a library. Waits for a permit; fails with [`Error::Busy`] if none becomes free.
+/// Runs a computation on a library for the owner of a request. Waits for the owner's turn; fails with
+/// [`Error::Busy`] if it does not come in time.
 async fn compute<Output: Send + 'static>(
     context: &Context,
+    owner: &Owner,
     library: &Library,
     work: impl FnOnce(StoredLibrary, &Draft, &Cancellation) -> Result<Output, Error> + Send + 'static,
 ) -> Result<Output, Error> {
-    let permit = context.synchronous_work.acquire().await?;
+    let permit = context.synchronous_work.acquire(owner).await?;
     let store = &context.store;
     let files = store.fetch(&library.folder, &library_dir::FILES).await?;
     let draft = store

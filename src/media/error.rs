@@ -124,6 +124,11 @@ pub enum Error {
         /// The end of ffmpeg's stderr.
         stderr_tail: String,
     },
+    /// Someone else killed the child: an operator, or the kernel when the memory of the machine ran out.
+    #[error(
+        "ffmpeg or ffprobe was killed from outside, probably because the machine ran out of memory"
+    )]
+    Killed,
     /// The child died or failed.
     #[error("ffmpeg or ffprobe stopped unexpectedly ({status}): {stderr_tail}")]
     Crashed {
@@ -179,7 +184,7 @@ impl Error {
             Error::Truncated(_) => Code::Truncated,
             Error::Encrypted => Code::Encrypted,
             Error::TimeLimit => Code::TimeLimit,
-            Error::MemoryLimit { .. } => Code::MemoryLimit,
+            Error::MemoryLimit { .. } | Error::Killed => Code::MemoryLimit,
             Error::Crashed { .. } => Code::DecoderCrashed,
             Error::StorageFull => Code::StorageFull,
             Error::BadOutput(_)

@@ -11,6 +11,8 @@ use super::error::Error;
 pub(super) struct Exit {
     /// Exit code or signal.
     pub(super) status: ExitStatus,
+    /// Whether it reached the limit of its processor time.
+    pub(super) used_up_processor_time: bool,
     /// The end of its stderr.
     pub(super) stderr_tail: String,
 }
@@ -31,17 +33,16 @@ impl Exit {
         match self.status.signal() {
             None if self.status.success() => Ok(self),
             Some(SIGXCPU) => Err(Error::TimeLimit),
+            Some(SIGKILL) if self.used_up_processor_time => Err(Error::TimeLimit),
             Some(SIGXFSZ) => Err(Error::StorageFull),
             _ if says("No space left on device") || says("Disk quota exceeded") => {
                 Err(Error::StorageFull)
             }
-            // Flockreel kills only children that it no longer waits for, so this kill came from the kernel,
-            // out of memory.
-            signal if signal == Some(SIGKILL) || OUT_OF_MEMORY.into_iter().any(says) => {
-                Err(Error::MemoryLimit {
-                    stderr_tail: self.stderr_tail,
-                })
-            }
+            _ if OUT_OF_MEMORY.into_iter().any(says) => Err(Error::MemoryLimit {
+                stderr_tail: self.stderr_tail,
+            }),
+            // Flockreel kills only children that it no longer waits for.
+            Some(SIGKILL) => Err(Error::Killed),
             _ => Err(Error::Crashed {
                 status: self.status.to_string(),
                 stderr_tail: self.stderr_tail,

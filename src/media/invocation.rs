@@ -4,12 +4,14 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use super::limits::Limits;
 use super::sandbox::{Layers, Policy, ProgramFiles};
 use crate::config;
 
 /// An installed tool.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct InstalledTool {
     /// Path of the program.
     pub(super) path: PathBuf,

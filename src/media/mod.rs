@@ -13,7 +13,7 @@ mod decode; // video file -> frames
 mod encode; // VideoWriter: frames -> MP4, WebM, ProRes, GIF, WebP
 mod error;
 mod exit; // exit of a child and its meaning
-mod gate; // the only module that starts a media tool
+mod gate; // the only module that starts a media tool; process groups
 mod gray_range; // reduction of gray to 8 bits
 mod image; // still pictures, such as a background
 mod invocation; // one run of a media tool
@@ -29,13 +29,15 @@ mod video; // Video: video files and still pictures
 pub use codecs::Codecs;
 pub use encode::{Encoding, Quality, VideoFormat, VideoWriter, write_picture};
 pub use error::{Damage, Error};
+pub use gate::ProcessGroup;
 pub use image::{decode_image, read_image};
 pub use limits::Limits;
 pub use notice::Notice;
+pub use probe::check_ffprobe_output;
 pub use read_options::ReadOptions;
 pub use sandbox::{Layer, Layers};
 pub use tools::{
-    SandboxStatus, Tool, configure, required_sandbox, sandbox_status, search_in_background,
-    tool_version,
+    FoundTools, SandboxStatus, Tool, adopt_tools, configure, found_tools, required_sandbox,
+    sandbox_status, search_in_background, tool_version,
 };
 pub use video::Video;

@@ -6,6 +6,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
+use serde::{Deserialize, Serialize};
+
 use super::error::Error;
 use super::exit::Exit;
 use super::gate::Child;
@@ -35,11 +37,19 @@ pub struct SandboxStatus {
 }
 
 /// A tool that was found.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct FoundTool {
     tool: InstalledTool,
     version: String,
     /// Layers that are not in use, each with the reason.
     missing_layers: Vec<(Layer, String)>,
+}
+
+/// The tools as this process found them, for its child processes.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FoundTools {
+    ffmpeg: FoundTool,
+    ffprobe: FoundTool,
 }
 
 /// The search for a tool.
@@ -96,6 +106,24 @@ pub fn required_sandbox() -> Result<SandboxStatus, Error> {
     installed(Tool::Ffprobe)?;
     installed(Tool::Ffmpeg)?;
     sandbox_status()
+}
+
+/// Returns the tools for a child process. Fails as [`required_sandbox`] does.
+pub fn found_tools() -> Result<FoundTools, Error> {
+    required_sandbox()?;
+    Ok(FoundTools {
+        ffmpeg: found(Tool::Ffmpeg)?.clone(),
+        ffprobe: found(Tool::Ffprobe)?.clone(),
+    })
+}
+
+/// Makes this process use the tools that its parent found. Call it before the first film is read; it replaces
+/// the search.
+pub fn adopt_tools(tools: FoundTools) {
+    for (search, tool) in [(&FFMPEG, tools.ffmpeg), (&FFPROBE, tools.ffprobe)] {
+        // If a search has already ended, its result remains.
+        search.result.set(Ok(tool)).ok();
+    }
 }
 
 /// Returns the version line of the installed ffmpeg.
@@ -215,7 +243,7 @@ fn is_transient(error: &Error) -> bool {
     use std::io::ErrorKind::{Interrupted, OutOfMemory, ResourceBusy, WouldBlock};
     const TOO_MANY_FILES: [Option<i32>; 2] = [Some(libc::EMFILE), Some(libc::ENFILE)];
     match error {
-        Error::TimeLimit => true,
+        Error::TimeLimit | Error::Killed => true,
         Error::Io { source, .. } => {
             let kinds = [Interrupted, OutOfMemory, ResourceBusy, WouldBlock];
             kinds.contains(&source.kind()) || TOO_MANY_FILES.contains(&source.raw_os_error())

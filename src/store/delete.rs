@@ -8,14 +8,35 @@
 
 use sqlx::types::Uuid;
 
+use super::jobs::enqueue::QUEUE_LOCK;
 use super::resources::ResourceKind;
 use super::{Error, Store, Transaction, sql};
 
 impl Store {
     /// Deletes a resource and everything made from it. Returns false if the resource does not exist.
     pub async fn delete(&self, kind: ResourceKind, id: Uuid) -> Result<bool, Error> {
+        self.delete_if(kind, id, None).await
+    }
+
+    /// Like [`Store::delete`], but first runs the statement of `condition`, with its number as the first and `id` as the
+    /// second parameter. If that selects no id, deletes nothing and returns false.
+    pub(super) async fn delete_if(
+        &self,
+        kind: ResourceKind,
+        id: Uuid,
+        condition: Option<(&str, i64)>,
+    ) -> Result<bool, Error> {
         let delete = || async {
             let mut transaction = self.writer.begin().await?;
+            if let Some((sql, parameter)) = condition {
+                // No job that uses the resource is queued meanwhile.
+                transaction.lock(QUEUE_LOCK).await?;
+                let select = sql::query_scalar(sql.to_owned()).bind(parameter).bind(id);
+                let found: Option<Uuid> = select.fetch_optional(&mut transaction).await?;
+                if found.is_none() {
+                    return Ok(false);
+                }
+            }
             let folders = match kind {
                 ResourceKind::Footage => delete_footage_rows(&mut transaction, id).await?,
                 ResourceKind::Library => delete_library_rows(&mut transaction, id).await?,

@@ -60,6 +60,19 @@ pub enum Error {
         /// The maximum per owner.
         quota: i64,
     },
+    /// The files and open uploads of an owner would exceed their maximum size.
+    #[error(
+        "{n_bytes} bytes do not fit: the owner has {used_bytes} of at most {max_bytes} bytes; delete films or flocks that \
+         are no longer needed, `GET /v1/usage` shows what takes the space"
+    )]
+    OwnerStorageFull {
+        /// Stored and announced bytes.
+        used_bytes: u64,
+        /// Bytes that do not fit.
+        n_bytes: u64,
+        /// The maximum per owner, bytes.
+        max_bytes: u64,
+    },
     /// The queue has reached the maximum number of queued and running jobs of all owners.
     #[error(
         "the queue is full ({max_queued} queued and running jobs): try again when some have ended"
@@ -87,6 +100,7 @@ impl Error {
             Error::AlreadyStored => Code::AlreadyStored,
             Error::QuotaExceeded { .. } => Code::QuotaExceeded,
             Error::QueueFull { .. } => Code::QueueFull,
+            Error::OwnerStorageFull { .. } => Code::OwnerStorageFull,
             Error::Io(error) if is_disk_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Io(error)) if is_disk_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Database(error)) if is_database_full(error.as_ref()) => {

@@ -6,7 +6,7 @@ use sqlx::types::Uuid;
 
 use super::jobs::Lease;
 use super::jobs::finish::Outcome;
-use super::owners::{Owner, OwnerFilter};
+use super::owners::Owner;
 use super::{BlobFile, Draft, Error, Store, Transaction, blobs, sql};
 
 /// File name of the video in its folder.
@@ -48,6 +48,10 @@ pub struct Footage {
     pub n_frames_hint: i64,
     /// Whether this is the sample that the program made at its first start.
     pub sample: bool,
+    /// Whether it stays even if nobody uses it.
+    pub pinned: bool,
+    /// Time of the last use, milliseconds since 1970.
+    pub used_ms: i64,
     /// Time of storage, milliseconds since 1970.
     pub created_ms: i64,
 }
@@ -78,41 +82,26 @@ pub enum Added {
 
 impl Store {
     /// Moves the received files into place and adds the row. Sets `footage.folder`. Returns the existing
-    /// footage if the owner has already stored the same files.
+    /// footage if the owner has already stored the same files. `upload` is the resumable upload that they came by.
     pub async fn add_footage(
         &self,
         mut footage: Footage,
         draft: Draft,
         files: &[BlobFile],
+        upload: Option<Uuid>,
     ) -> Result<Added, Error> {
         if let Some(known) = self.footage_of_bytes(&footage).await? {
             return Ok(Added::Known(known));
         }
         footage.folder = format!("footage/{}", footage.id);
         self.blobs.adopt(draft, &footage.folder).await?;
-        match self.insert_footage(&footage, files).await {
+        match self.insert_footage(&footage, files, upload).await {
             Ok(()) => {
                 tracing::info!(footage.id = %footage.id, size_bytes = footage.size_bytes, "footage stored");
                 Ok(Added::New(footage))
             }
-            Err(error) => self.settle(footage, error.into()).await,
+            Err(error) => self.settle(footage, error).await,
         }
-    }
-
-    /// Changes the label of a footage. Returns false if the footage does not exist.
-    pub async fn rename_footage(
-        &self,
-        id: Uuid,
-        name: &str,
-        owners: &OwnerFilter,
-    ) -> Result<bool, Error> {
-        let sql = "update footage set name = $2 where id = $1 and ($3 is null or owner = $3)";
-        let rename = sql::query(sql).bind(id).bind(name);
-        let rename = rename.bind(owners.parameter());
-        let mut transaction = self.begin().await?;
-        let n_renamed = rename.execute(&mut transaction).await?;
-        transaction.commit().await?;
-        Ok(n_renamed > 0)
     }
 
     /// Decides the outcome after a failed insert. The row may exist nevertheless if only the database's reply
@@ -146,12 +135,16 @@ impl Store {
         &self,
         footage: &Footage,
         files: &[BlobFile],
-    ) -> Result<(), sqlx::Error> {
+        upload: Option<Uuid>,
+    ) -> Result<(), Error> {
         let mut transaction = self.begin().await?;
+        let (owner, n_bytes) = (&footage.owner, footage.size_bytes);
+        self.require_owner_space(&mut transaction, owner, n_bytes, upload)
+            .await?;
         sql::query(
             "insert into footage (id, folder, sha256, background_sha256, name, size_bytes, width, \
-             height, fps, n_frames_hint, sample, created_ms, owner, masks_sha256) \
-             values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14)",
+             height, fps, n_frames_hint, sample, created_ms, owner, masks_sha256, pinned, used_ms) \
+             values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, $13, $14, $15, $16)",
         )
         .bind(footage.id)
         .bind(&footage.folder)
@@ -167,10 +160,12 @@ impl Store {
         .bind(footage.created_ms)
         .bind(&footage.owner)
         .bind(&footage.masks_sha256)
+        .bind(footage.pinned)
+        .bind(footage.used_ms)
         .execute(&mut transaction)
         .await?;
         blobs::insert(&mut transaction, &footage.folder, files).await?;
-        transaction.commit().await
+        Ok(transaction.commit().await?)
     }
 }
 
@@ -187,8 +182,8 @@ pub(super) async fn insert_sample(
     let video = video.ok_or_else(|| io::Error::other("the sample job produced no video"))?;
     let added = sql::query(
         "insert into footage (id, job_id, fence, folder, sha256, background_sha256, name, size_bytes, width, \
-         height, fps, n_frames_hint, sample, created_ms, owner) \
-         values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, true, $13, \
+         height, fps, n_frames_hint, sample, created_ms, used_ms, owner) \
+         values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $10, $11, $12, true, $13, $13, \
          (select owner from jobs where id = $2))",
     )
     .bind(lease.result_id)
@@ -235,6 +230,8 @@ mod tests {
             fps: 25.0,
             n_frames_hint: 40,
             sample: false,
+            pinned: false,
+            used_ms: 0,
             created_ms: 0,
         }
     }
@@ -264,7 +261,7 @@ mod tests {
         let store = fresh::open(data.path()).await;
         let film = footage(1);
         let files = put_in_place(&store, &film).await;
-        store.insert_footage(&film, &files).await.unwrap();
+        store.insert_footage(&film, &files, None).await.unwrap();
         let added = store.settle(film.clone(), lost()).await.unwrap();
         assert_eq!((added, n_folders(&store).await), (Added::New(film), 1));
     }
@@ -287,7 +284,7 @@ mod tests {
         for film in [&first, &second] {
             put_in_place(&store, film).await;
         }
-        store.insert_footage(&first, &[]).await.unwrap();
+        store.insert_footage(&first, &[], None).await.unwrap();
         let added = store.settle(second, lost()).await.unwrap();
         assert_eq!((added, n_folders(&store).await), (Added::Known(first), 1));
     }

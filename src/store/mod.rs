@@ -15,6 +15,7 @@ pub mod intake;
 pub mod jobs;
 pub mod owners;
 pub mod resources;
+pub mod space;
 pub mod spill;
 mod sql;
 pub mod tls;
@@ -44,6 +45,7 @@ pub struct Store {
     reader: Pool,
     reserve: Reserve,
     blobs: Blobs,
+    space: space::Space,
     upload_locks: uploads::UploadLocks,
     /// Locks held while the store is open. They guarantee that no other process serves the same folder. Empty
     /// if this process opened the store beside another one.
@@ -107,6 +109,7 @@ impl Store {
             reader,
             reserve,
             blobs,
+            space: space::Space::default(),
             upload_locks: uploads::UploadLocks::default(),
             locks: Arc::new(locks),
             is_alone,
@@ -139,11 +142,18 @@ impl Store {
 
     /// Returns whether the database accepts a write transaction within 2 s; for the readiness check.
     pub async fn is_writable(&self) -> bool {
-        let probe = async { self.writer.begin().await?.rollback().await };
-        matches!(
-            tokio::time::timeout(Duration::from_secs(2), probe).await,
-            Ok(Ok(()))
-        )
+        answers(async { self.writer.begin().await?.rollback().await }).await
+    }
+
+    /// Returns whether the database answers a query within 2 s; for the readiness check.
+    pub async fn is_readable(&self) -> bool {
+        let any = sql::query_scalar("select exists (select 1 from tokens)");
+        answers(any.fetch_one::<bool>(&self.reader)).await
+    }
+
+    /// Fails with `storage_full` if the disk has no space for new rows besides the reserve of the database.
+    pub async fn require_rows(&self) -> Result<(), Error> {
+        Ok(self.reserve.require().await?)
     }
 
     /// Closes all connections. SQLite then writes its write-ahead log into the database file.
@@ -159,6 +169,12 @@ impl Store {
         self.reserve.require().await?;
         self.writer.begin().await
     }
+}
+
+/// Returns whether a probe of the database succeeds within 2 s.
+async fn answers<T>(probe: impl Future<Output = Result<T, sqlx::Error>>) -> bool {
+    let answer = tokio::time::timeout(Duration::from_secs(2), probe).await;
+    matches!(answer, Ok(Ok(_)))
 }
 
 fn lock(path: &Path) -> Result<File, Error> {

@@ -33,6 +33,15 @@ impl ResourceFilter {
     }
 }
 
+/// A new property of a resource.
+#[derive(Clone, Copy, Debug)]
+pub enum Property<'a> {
+    /// Label; only of footage.
+    Name(&'a str),
+    /// Whether it stays even if nobody uses it.
+    Pinned(bool),
+}
+
 /// Kinds of stored resources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResourceKind {
@@ -55,6 +64,9 @@ pub trait Resource {
 
     /// Returns the id of a row.
     fn id(row: &Self::Row) -> Uuid;
+
+    /// Returns the time of the last use of a row, milliseconds since 1970.
+    fn used_ms(row: &Self::Row) -> i64;
 }
 
 impl Resource for Footage {
@@ -63,6 +75,10 @@ impl Resource for Footage {
 
     fn id(row: &Footage) -> Uuid {
         row.id
+    }
+
+    fn used_ms(row: &Footage) -> i64 {
+        row.used_ms
     }
 }
 
@@ -87,6 +103,10 @@ pub struct Library {
     pub sample: bool,
     /// Total size of the files, bytes.
     pub size_bytes: i64,
+    /// Whether it stays even if nobody uses it.
+    pub pinned: bool,
+    /// Time of the last use, milliseconds since 1970.
+    pub used_ms: i64,
     /// Time at which the analysis finished, milliseconds since 1970.
     pub created_ms: i64,
 }
@@ -97,6 +117,10 @@ impl Resource for Library {
 
     fn id(row: &Library) -> Uuid {
         row.id
+    }
+
+    fn used_ms(row: &Library) -> i64 {
+        row.used_ms
     }
 }
 
@@ -110,6 +134,10 @@ impl Resource for Flock {
     fn id(row: &FilmRow) -> Uuid {
         row.id
     }
+
+    fn used_ms(row: &FilmRow) -> i64 {
+        row.used_ms
+    }
 }
 
 /// Virtual fish. Their rows are [`FilmRow`]s.
@@ -121,6 +149,10 @@ impl Resource for Fish {
 
     fn id(row: &FilmRow) -> Uuid {
         row.id
+    }
+
+    fn used_ms(row: &FilmRow) -> i64 {
+        row.used_ms
     }
 }
 
@@ -145,6 +177,10 @@ pub struct FilmRow {
     pub sample: bool,
     /// Total size of the files, bytes.
     pub size_bytes: i64,
+    /// Whether it stays even if nobody uses it.
+    pub pinned: bool,
+    /// Time of the last use, milliseconds since 1970.
+    pub used_ms: i64,
     /// Time at which the job finished, milliseconds since 1970.
     pub created_ms: i64,
 }
@@ -189,13 +225,13 @@ impl ResourceKind {
             ResourceKind::Footage => "select * from footage r".to_owned(),
             ResourceKind::Library => {
                 "select r.id, r.job_id, footage_id, r.folder, params, summary, f.name, sample, \
-                 r.size_bytes, r.created_ms \
+                 r.size_bytes, r.pinned, r.used_ms, r.created_ms \
                  from libraries r join footage f on f.id = footage_id"
                     .to_owned()
             }
             ResourceKind::Flock | ResourceKind::Fish => format!(
                 "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, f.name, sample, \
-                 r.size_bytes, r.created_ms \
+                 r.size_bytes, r.pinned, r.used_ms, r.created_ms \
                  from {table} r join libraries l on l.id = library_id \
                  join footage f on f.id = footage_id"
             ),
@@ -204,6 +240,45 @@ impl ResourceKind {
 }
 
 impl Store {
+    /// Changes properties of a resource together. Returns false if it does not exist or is not visible to the caller.
+    pub async fn change(
+        &self,
+        kind: ResourceKind,
+        id: Uuid,
+        properties: &[Property<'_>],
+        owners: &OwnerFilter,
+    ) -> Result<bool, Error> {
+        let mut transaction = self.begin().await?;
+        let mut n_changed = 0;
+        for property in properties {
+            let column = match property {
+                Property::Name(_) => "name",
+                Property::Pinned(_) => "pinned",
+            };
+            let table = kind.plural();
+            let sql = format!(
+                "update {table} set {column} = $2 where id = $1 and ($3 is null or owner = $3)"
+            );
+            let change = sql::query(sql).bind(id);
+            let change = match *property {
+                Property::Name(name) => change.bind(name),
+                Property::Pinned(pinned) => change.bind(pinned),
+            };
+            let change = change.bind(owners.parameter());
+            n_changed += change.execute(&mut transaction).await?;
+        }
+        transaction.commit().await?;
+        Ok(n_changed > 0)
+    }
+
+    /// Records that a resource was used.
+    pub async fn record_use(&self, kind: ResourceKind, id: Uuid, now_ms: i64) -> Result<(), Error> {
+        let sql = format!("update {} set used_ms = $2 where id = $1", kind.plural());
+        let update = sql::query(sql).bind(id).bind(now_ms);
+        update.execute(&self.writer).await?;
+        Ok(())
+    }
+
     /// Returns the resource if it exists and is visible to the caller.
     pub async fn resource<R: Resource>(
         &self,

@@ -68,10 +68,24 @@ pub struct UploadFile {
 }
 
 impl Store {
-    /// Adds an upload that has no bytes yet.
+    /// Adds an upload that has no bytes yet. Fails with [`Error::OwnerStorageFull`] or `storage_full` if its announced
+    /// size does not fit.
     pub async fn create_upload(&self, upload: &Upload) -> Result<(), Error> {
         self.reserve.require().await?;
         File::create_new(self.upload_path(upload.id)).await?;
+        // Otherwise a power loss could take the file's name, and with it bytes that were confirmed.
+        File::open(self.blobs.uploads()).await?.sync_all().await?;
+        let inserted = self.insert_upload(upload).await;
+        if inserted.is_err() {
+            self.remove_upload_file(upload.id)?;
+        }
+        inserted
+    }
+
+    async fn insert_upload(&self, upload: &Upload) -> Result<(), Error> {
+        let mut transaction = self.writer.begin().await?;
+        self.require_upload_space(&mut transaction, &upload.owner, upload.size_bytes)
+            .await?;
         let sql = "insert into uploads (id, name, size_bytes, expires_ms, owner) \
                    values ($1, $2, $3, $4, $5)";
         let insert = sql::query(sql)
@@ -80,11 +94,8 @@ impl Store {
             .bind(upload.size_bytes)
             .bind(upload.expires_ms)
             .bind(&upload.owner);
-        if let Err(error) = insert.execute(&self.writer).await {
-            self.remove_upload_file(upload.id)?;
-            return Err(error.into());
-        }
-        Ok(())
+        insert.execute(&mut transaction).await?;
+        Ok(transaction.commit().await?)
     }
 
     /// Returns an upload that has not expired and is visible to the caller.

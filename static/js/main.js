@@ -1,5 +1,6 @@
 // Starts the page: words of the frame, session, jobs, and the place of the current address.
 // @ts-check
+import { isSignedIn } from "./app/api.js";
 import { startJobs } from "./app/jobs.js";
 import { byId } from "./app/element.js";
 import { startRouter } from "./app/router.js";
@@ -24,7 +25,7 @@ if (!isGuest) {
 }
 startRouter();
 
-/** Light or dark: as the system has it, or as the person chose. */
+/** Light or dark: as the system has it, or as the person chose. Canvases hear of a change by the event `theme`. */
 function startTheme() {
   const button = byId("theme");
   const system = matchMedia("(prefers-color-scheme: dark)");
@@ -33,6 +34,7 @@ function startTheme() {
     document.documentElement.style.colorScheme = theme;
     button.setAttribute("aria-label", say(isDark() ? "theme.light" : "theme.dark"));
     button.title = button.getAttribute("aria-label");
+    dispatchEvent(new Event("theme"));
   };
   use(localStorage.getItem("flockreel-theme") ?? "");
   system.addEventListener("change", () => use(document.documentElement.style.colorScheme));
@@ -46,6 +48,6 @@ function startTheme() {
 /** Most services need no token: the form and the button to sign out are loaded when they are needed. */
 function startSessionWhenNeeded() {
   const load = async () => (await import("./app/session.js")).startSession();
-  if (localStorage.getItem("flockreel-signed-in")) load();
+  if (isSignedIn()) load();
   else addEventListener("signed-out", async () => { await load(); dispatchEvent(new Event("signed-out")); }, { once: true });
 }

@@ -48,7 +48,7 @@ class Walk:
         self.delete(ids)
 
     def watch(self):
-        for path in ("/healthz", "/readyz", "/metrics"):
+        for path in ("/healthz", "/readyz", "/metrics", "/v1/usage"):
             self.call(f"GET {path}")
 
     def make(self):
@@ -106,6 +106,7 @@ class Walk:
         for noun, nouns, file in (("library", "libraries", "poses.json"), ("flock", "flocks", "video.mp4"), ("fish", "fish", "model.glb")):
             self.call(f"GET /v1/{nouns}/{{id}}", {"id": ids[noun]})
             self.call(f"GET /v1/{nouns}/{{id}}/{{file}}", {"id": ids[noun], "file": file})
+            self.call(f"PATCH /v1/{nouns}/{{id}}", {"id": ids[noun]}, body={"pinned": True})
         part = self.call("GET /v1/footage/{id}/file", {"id": ids["footage"]}, headers={"Range": "bytes=0-9"})
         assert part.status_code == 206 and part.content == self.film[:10]
         self.call("GET /v1/footage/{id}", {"id": ids["footage"]})

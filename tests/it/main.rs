@@ -10,6 +10,7 @@ mod api;
 mod cli;
 mod common;
 mod film;
+mod fuzz;
 mod jobs;
 pub(crate) mod media;
 mod scale;

@@ -5,7 +5,7 @@ import { lengthOf, NotAFish, readGlb } from "../../static/js/fish/glb.js";
 import { filmLens, seenAt } from "../../static/js/fish/lens.js";
 import { moved, multiply, rigid } from "../../static/js/fish/matrix.js";
 import { createOrbit, viewOf } from "../../static/js/fish/orbit.js";
-import { directionOf, postureAt, roomOf } from "../../static/js/fish/posture.js";
+import { directionOf, postureAt, boundsOf } from "../../static/js/fish/posture.js";
 import { floorOf, plumbOf, wayOf } from "../../static/js/fish/scenery.js";
 import { changedFrom, PAPERS, savedName, shownAs } from "../../static/js/fish/settings.js";
 import { glbFile } from "./glb-file.mjs";
@@ -50,11 +50,11 @@ test("a direction away from the camera is told as such", () => {
   close([directionOf({ forward: [0, 0, -1] }).away_rad, directionOf({ forward: [0.8, -0.6, 0] }).heading_rad], [Math.PI / 2, Math.atan2(0.6, 0.8)]);
 });
 
-test("frames beyond the film show its ends, and hidden frames have no room", () => {
+test("frames beyond the film show its ends, and hidden frames have no bounds", () => {
   const fish = readGlb(glbFile());
   assert.deepEqual(postureAt(fish, 9), postureAt(fish, 1));
   assert.deepEqual(postureAt(fish, -1), postureAt(fish, 0));
-  assert.deepEqual(roomOf(fish), { low: [0, 0, -1], high: [0, 0, -1] });
+  assert.deepEqual(boundsOf(fish), { low: [0, 0, -1], high: [0, 0, -1] });
 });
 
 test("the lens of the film shows a point where the measured camera saw it", () => {
@@ -91,11 +91,11 @@ test("turning stops short of straight above, zooming at its ends, and a reset go
 });
 
 test("the floor is below the fish, or behind one seen from above", () => {
-  const room = { low: [0, 0, -2], high: [1, 1, -1] };
-  const heights = (isFromAbove, axis) => new Set(Array.from(floorOf(room, 0.1, isFromAbove).lines).filter((_, k) => k % 3 === axis).map((value) => value.toFixed(3)));
+  const bounds = { low: [0, 0, -2], high: [1, 1, -1] };
+  const heights = (isFromAbove, axis) => new Set(Array.from(floorOf(bounds, 0.1, isFromAbove).lines).filter((_, k) => k % 3 === axis).map((value) => value.toFixed(3)));
   assert.deepEqual([...heights(false, 1)], ["-0.080"]);
   assert.deepEqual([...heights(true, 2)], ["-2.080"]);
-  assert.ok(floorOf({ low: [0, 0, 0], high: [100, 1, 100] }, 0.01, false).lines.length < 1000, "a large room has large squares");
+  assert.ok(floorOf({ low: [0, 0, 0], high: [100, 1, 100] }, 0.01, false).lines.length < 1000, "large bounds have large squares");
 });
 
 test("the way leaves gaps open and the plumb line ends on the floor", () => {

@@ -5,7 +5,7 @@ import { test } from "node:test";
 // The page's words ask the browser for its language.
 Object.assign(globalThis, { location: new URL("http://page/"), localStorage: { getItem: () => null }, navigator: { languages: ["en"] }, document: { documentElement: {} } });
 const { piecesOf } = await import("../../static/js/reel/pieces.js");
-const { changedOf, filesOf, savedName, studioAddress } = await import("../../static/js/reel/settings.js");
+const { changedOf, filesOf, filmFileOf, savedName, sharedFilesOf, studioAddress } = await import("../../static/js/reel/settings.js");
 const { pathOf, readLink } = await import("../../static/js/reel/shared-link.js");
 const { roundUp, seriesOf, thin } = await import("../../static/js/reel/strips.js");
 const { createTracks, readTracks } = await import("../../static/js/reel/tracks.js");
@@ -38,6 +38,16 @@ test("only files that the flock has are listed", () => {
   assert.deepEqual(files({ formats: ["png", "webm"], overlay: true, ground_truth: false }), ["video.mp4", "video.webm", "frames.zip", "overlay.mp4", "flock.json", "flock.plan", "plan.svg"]);
   assert.deepEqual(files({ formats: ["poster"], overlay: false, ground_truth: true }), ["video.mp4", "poster.png", "tracks.csv", "ground-truth.zip", "flock.json", "flock.plan", "plan.svg"]);
   assert.deepEqual(filesOf({ files: [{ name: "a.csv" }], params: {} }), ["a.csv"]);
+});
+
+test("the film of a transparent flock is the one that is transparent, and its link offers that film", () => {
+  const flock = (background, formats) => ({ params: { render: { background, formats } } });
+  assert.equal(filmFileOf(flock("transparent", ["webm"])), "video.webm");
+  assert.equal(filmFileOf(flock("transparent", ["mov", "gif"])), "video.mov");
+  assert.equal(filmFileOf(flock("transparent", [])), "video.mp4");
+  assert.equal(filmFileOf(flock("plate", ["webm"])), "video.mp4");
+  assert.deepEqual(sharedFilesOf(flock("transparent", ["webm"])), ["video.mp4", "flock.plan", "video.webm"]);
+  assert.deepEqual(sharedFilesOf(flock("plate", ["webm"])), ["video.mp4", "flock.plan"]);
 });
 
 test("files are saved under a name that a person understands", () => {
@@ -86,10 +96,15 @@ test("a long line keeps its peaks, and an axis ends at a round number", () => {
 
 test("a shared link holds the signatures of its files, and nothing else is read from it", () => {
   const id = "01a21fc9-7d95-7277-b444-2600ce840b02";
-  const path = pathOf(id, [{ url: `/v1/flocks/${id}/video.mp4?expires=20&signature=ab` }, { url: `/v1/flocks/${id}/flock.plan?expires=19&signature=cd` }]);
+  const link = (name, query) => ({ name, url: `/v1/flocks/${id}/${name}?${query}` });
+  const links = [link("video.mp4", "expires=20&signature=ab"), link("flock.plan", "expires=19&signature=cd")];
+  const path = pathOf(id, links);
   assert.equal(path, `/s/${id}~20.ab~19.cd`);
-  assert.deepEqual(readLink(path.slice(3)), { files: [`/v1/flocks/${id}/video.mp4?expires=20&signature=ab`, `/v1/flocks/${id}/flock.plan?expires=19&signature=cd`], expires_s: 19 });
-  for (const text of ["", id, `${id}~20.ab`, `${id}~20.ab~19.cd~1.a`, `../../x~20.ab~19.cd`, `${id}~20.ab~19.<b>`]) assert.equal(readLink(text), null);
+  assert.deepEqual(readLink(path.slice(3)), { files: [`/v1/flocks/${id}/video.mp4?expires=20&signature=ab`, `/v1/flocks/${id}/flock.plan?expires=19&signature=cd`], offered: null, expires_s: 19 });
+  const withClear = pathOf(id, [...links, link("video.webm", "expires=18&signature=ef")]);
+  assert.equal(withClear, `/s/${id}~20.ab~19.cd~webm.18.ef`);
+  assert.deepEqual([readLink(withClear.slice(3)).offered, readLink(withClear.slice(3)).expires_s], [`/v1/flocks/${id}/video.webm?expires=18&signature=ef`, 18]);
+  for (const text of ["", id, `${id}~20.ab`, `${id}~20.ab~19.cd~1.a`, `${id}~20.ab~19.cd~zip.1.a`, `../../x~20.ab~19.cd`, `${id}~20.ab~19.<b>`]) assert.equal(readLink(text), null);
 });
 
 test("pieces of film end at jumps and where the mirror side changes, and tell the mean difference of heading", () => {

@@ -275,6 +275,19 @@ def test_a_reel_that_is_deleted_goes_to_the_list_and_is_gone_when_the_page_close
     until(page, lambda: not exists(f"{filled_service}/v1/flocks/{flock}"))
 
 
+def test_flocks_and_films_are_pinned_in_their_lists(page, filled_service, flock):
+    footage = get(f"{filled_service}/v1/footage")["items"][0]
+    for place, noun, thing in (("flocks", "flocks", flock), ("films", "footage", footage)):
+        for pinned in (True, False):
+            page.goto(f"{filled_service}/{place}")
+            pin = page.locator(f'.card-small:has(a[href="/{place}/{thing["id"]}"])').get_by_role("button", name=re.compile("^Pin: "))
+            expect(pin).to_have_attribute("aria-pressed", "false" if pinned else "true", timeout=LOAD_MS)
+            pin.press("Enter")
+            expect(pin).to_have_attribute("aria-pressed", "true" if pinned else "false")
+            assert get(f"{filled_service}/v1/{noun}/{thing['id']}")["pinned"] == pinned
+    expect(page.get_by_text(re.compile(r"^Your films and flocks take [\d.]+ MB of 34\.4 GB\.$"))).to_be_visible()
+
+
 def test_the_list_is_searched_by_the_name_of_the_film(page, filled_service):
     page.goto(f"{filled_service}/flocks")
     cards = page.locator(".card-small:visible")

@@ -157,7 +157,7 @@ def test_a_cancelled_upload_vanishes_and_nothing_is_kept(page, empty_service, ot
     expect(page).to_have_url(re.compile("/films/"), timeout=LONG_MS)
 
 
-def test_a_cancelled_analysis_stops_soon_and_the_focus_stays_on_the_page(page, empty_service, tmp_path):
+def test_a_cancelled_analysis_stops_soon_and_can_be_tried_again(page, empty_service, tmp_path):
     film = make_film(tmp_path / "carp.mp4", seed=31, frames=240, size="640x480")
     page.goto(empty_service)
     choose_film(page, film)
@@ -169,6 +169,9 @@ def test_a_cancelled_analysis_stops_soon_and_the_focus_stays_on_the_page(page, e
     until(page, "document.activeElement !== document.body")
     page.goto(f"{empty_service}/jobs")
     expect(place).to_contain_text(say(page, "state.cancelled"))
+    place.get_by_role("button", name=say(page, "job.retry")).click()
+    expect(place.get_by_role("link", name=say(page, "job.open"))).to_be_visible(timeout=LONG_MS)
+    assert len(get(f"{empty_service}/v1/jobs")["items"]) == 1
 
 
 def test_the_reason_of_a_failed_job_is_in_the_list_of_jobs(page, filled_service):

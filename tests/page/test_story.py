@@ -19,7 +19,7 @@ def test_a_film_becomes_a_flock_that_swims_and_a_film_that_plays_and_downloads(p
     choose_film(page, other_film)
     expect(page).to_have_url(re.compile(r"/films/[0-9a-f-]{36}"), timeout=LONG_MS)
     expect(page).to_have_title(re.compile(f"^{other_film.stem} "))
-    expect(page.get_by_text(say(page, "film.swims"))).to_be_visible(timeout=LONG_MS)
+    expect(page.get_by_text(say(page, "film.flock"))).to_be_visible(timeout=LONG_MS)
     expect_swimming(page)
 
     page.get_by_role("link", name=say(page, "film.studio")).click()
@@ -68,7 +68,7 @@ def test_the_whole_story_by_keys(page, empty_service, other_film):
     choosers[0].set_files(str(other_film))
     expect(heading(page)).to_have_text(other_film.stem, timeout=LONG_MS)
     expect(heading(page)).to_be_focused()
-    expect(page.get_by_text(say(page, "film.swims"))).to_be_visible(timeout=LONG_MS)
+    expect(page.get_by_text(say(page, "film.flock"))).to_be_visible(timeout=LONG_MS)
     tab_to(page, say(page, "film.studio"))
     page.keyboard.press("Enter")
     expect(page).to_have_url(re.compile("/studio"))
@@ -125,12 +125,12 @@ def test_the_whole_story_in_japanese_has_no_english(visitor, empty_service, othe
     choose_film(page, other_film)
     expect(page).to_have_url(re.compile("/films/"), timeout=LONG_MS)
     assert english_of(page) == []
-    expect(page.get_by_text(say(page, "film.swims"))).to_be_visible(timeout=LONG_MS)
+    expect(page.get_by_text(say(page, "film.flock"))).to_be_visible(timeout=LONG_MS)
     assert english_of(page) == []
     page.get_by_role("link", name=say(page, "film.desk")).click()
     until(page, "document.querySelector('#place').dataset.loaded === 'true'")
     assert english_of(page) == []
-    page.get_by_role("link", name=say(page, "desk.studio")).click()
+    page.get_by_role("link", name=say(page, "film.studio")).click()
     expect_swimming(page)
     assert english_of(page) == []
     small_flock(page)

@@ -47,7 +47,7 @@ def test_back_and_forward_go_through_places_with_their_titles(page, filled_servi
     arrive(f"{name} · flockreel")
     page.get_by_role("main").get_by_role("link", name=say(page, "film.desk")).click()
     arrive(f"{say(page, 'desk.title', film=name)} · flockreel")
-    page.get_by_role("link", name=say(page, "desk.studio")).click()
+    page.get_by_role("link", name=say(page, "film.studio")).click()
     arrive(f"{say(page, 'studio.title', film=name)} · flockreel")
     menu.get_by_role("link", name=say(page, "nav.flocks")).click()
     arrive(f"{say(page, 'reels.title')} · flockreel")
@@ -95,7 +95,47 @@ def test_reload_during_an_analysis_shows_the_same_job_and_its_result(page, fille
     assert len(analyses(filled_service)) == n_analyses
     page.reload()
     expect_swimming(page, LOAD_MS)
-    expect(page.get_by_text(say(page, "film.swims"))).to_be_visible()
+    expect(page.get_by_text(say(page, "film.flock"))).to_be_visible()
+
+
+def test_the_studio_shows_the_first_measurement_and_fills_by_itself(page, empty_service, slow_film):
+    page.goto(f"{empty_service}/studio")
+    expect(page.get_by_role("main")).to_contain_text(say(page, "studio.empty"))
+    begin_to_measure(page, empty_service, slow_film)
+    page.get_by_role("navigation").get_by_role("link", name=say(page, "nav.studio")).click()
+    place = page.get_by_role("main")
+    expect(place).to_contain_text(say(page, "film.wait"))
+    expect(place).to_contain_text(say(page, "job.analysis", film=slow_film.stem))
+    expect(place.get_by_role("progressbar")).to_be_visible()
+    library = get(f"{empty_service}/v1/jobs")["items"][0]["links"]["result"].rsplit("/", 1)[1]
+    # The address of its studio waits for it, too.
+    page.goto(f"{empty_service}/libraries/{library}/studio?count=4")
+    expect_swimming(page, LONG_MS)
+    expect(flock_canvas(page)).to_have_accessible_name(said(page, "living.n", n=4))
+    expect(heading(page)).to_have_text(say(page, "studio.title", film=slow_film.stem))
+    expect(place.get_by_role("progressbar")).to_have_count(0)
+
+
+def test_the_studio_goes_on_to_a_film_that_was_measured_meanwhile(page, filled_service, tmp_path):
+    film = make_film(tmp_path / "young tench.mp4", seed=13, frames=120, size="640x480")
+    begin_to_measure(page, filled_service, film)
+    page.get_by_role("navigation").get_by_role("link", name=say(page, "nav.studio")).click()
+    place = page.get_by_role("main")
+    expect(place).to_contain_text(say(page, "job.analysis", film=film.stem))
+    expect(heading(page)).to_have_text(say(page, "studio.title", film=film.stem), timeout=LONG_MS)
+    expect_swimming(page)
+
+
+def test_a_person_who_works_in_the_studio_is_offered_the_other_film(page, filled_service, tmp_path):
+    film = make_film(tmp_path / "old tench.mp4", seed=14, frames=120, size="640x480")
+    begin_to_measure(page, filled_service, film)
+    page.goto(f"{filled_service}/studio?count=3&frames=60")
+    place = page.get_by_role("main")
+    offer = place.get_by_role("status").filter(has_text=say(page, "studio.measured", film=film.stem))
+    expect(offer).to_be_visible(timeout=LONG_MS)
+    expect(heading(page)).not_to_contain_text(film.stem)
+    offer.get_by_role("link", name=say(page, "film.studio")).click()
+    expect(heading(page)).to_have_text(say(page, "studio.title", film=film.stem), timeout=LOAD_MS)
 
 
 def test_reload_during_rendering_shows_the_job_and_then_the_film(page, filled_service):

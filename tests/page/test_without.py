@@ -35,6 +35,38 @@ def test_flocks_swim_on_a_plain_canvas_without_webgl(page, filled_service):
     expect(flock_canvas(page)).to_have_accessible_name(said(page, "living.n", n=5))
 
 
+# The color in the upper left corner of a canvas, right after it was drawn; transparent black if it was not.
+CORNER = """(canvas) => new Promise((resolve) => requestAnimationFrame(() => {
+    const small = Object.assign(document.createElement("canvas"), { width: 48, height: 36 }).getContext("2d");
+    small.drawImage(canvas, 0, 0, 48, 36);
+    resolve([...small.getImageData(1, 1, 1, 1).data]);
+}))"""
+
+
+@pytest.mark.parametrize("script", ["", NO_WEBGL], ids=["webgl", "canvas"])
+def test_another_background_is_drawn_at_once(page, filled_service, script):
+    page.add_init_script(script)
+    page.goto(f"{filled_service}/studio?count=2&frames=60")
+    expect_swimming(page)
+
+    def shows(is_meant):
+        *color, alpha = flock_canvas(page).evaluate(CORNER)
+        return alpha == 255 and is_meant(color)
+
+    def is_blue(color):
+        # The color that is offered first: #103040.
+        return max(abs(a - b) for a, b in zip(color, (16, 48, 64), strict=True)) < 6
+
+    until(page, lambda: shows(lambda color: not is_blue(color)))
+    page.get_by_role("radio", name=say(page, "set.background.color"), exact=True).check()
+    until(page, lambda: shows(is_blue))
+    page.get_by_role("radio", name=say(page, "set.background.transparent")).check()
+    # Gray checkers.
+    until(page, lambda: shows(lambda color: max(color) - min(color) < 6 and min(color) > 140))
+    page.get_by_role("radio", name=say(page, "set.background.plate")).check()
+    until(page, lambda: shows(lambda color: max(color) - min(color) > 20 and not is_blue(color)))
+
+
 def test_lost_graphics_are_drawn_again(page, filled_service):
     page.goto(f"{filled_service}/studio?count=5&frames=60")
     expect_swimming(page)
@@ -102,6 +134,50 @@ def test_five_hundred_flocks_are_listed_page_by_page(page, filled_service):
     page.get_by_role("searchbox").fill("no such film")
     expect(page.get_by_role("main").get_by_role("listitem").filter(visible=True)).to_have_count(0)
     expect(page.get_by_text(say(page, "reels.found", n=0, query="no such film"))).to_be_visible()
+
+
+def test_a_film_is_measured_however_many_measurements_are_newer(page, filled_service):
+    library = get(f"{filled_service}/v1/libraries")["items"][-1]
+    others = [{**library, "id": f"{k:08x}-0000-7000-8000-000000000000", "footage_id": f"{k:08x}-0000-7000-8000-000000000001"} for k in range(200)]
+
+    def answer(route):
+        if "footage_id=" in route.request.url:
+            return route.continue_()
+        return route.fulfill(json={"items": others, "next_cursor": library["id"]})
+
+    page.route("**/v1/libraries?*", answer)
+    page.goto(f"{filled_service}/films")
+    card = page.get_by_role("main").get_by_role("listitem").filter(has=page.locator(f'a[href="/films/{library["footage_id"]}"]'))
+    expect(card).to_contain_text(say(page, "film.measured"), timeout=LOAD_MS)
+
+
+def test_a_film_is_called_deleted_only_if_the_service_says_so(page, filled_service):
+    job = next(one for one in get(f"{filled_service}/v1/jobs")["items"] if one["kind"] == "analysis")
+    broken = re.compile(r"/v1/(footage|libraries)[?/]")
+    page.route("**/v1/jobs?*", lambda route: route.fulfill(json={"items": [job], "next_cursor": None}))
+    page.route(broken, lambda route: route.fulfill(status=503, json={"title": "Not now.", "code": "busy"}))
+    page.goto(f"{filled_service}/jobs")
+    place = page.get_by_role("main")
+    expect(place).to_contain_text(say(page, "job.analysis", film=say(page, "film.unnamed")))
+    expect(place).not_to_contain_text(say(page, "film.deleted"))
+    page.unroute(broken)
+    younger = {"id": "ffffffff-ffff-7fff-bfff-ffffffffffff", "name": "younger.mp4"}
+    page.route("**/v1/footage?*", lambda route: route.fulfill(json={"items": [younger], "next_cursor": None}))
+    page.reload()
+    expect(place).to_contain_text(say(page, "job.analysis", film=say(page, "film.deleted")))
+
+
+def test_a_job_that_waits_tells_how_many_come_before_it(page, filled_service):
+    job = get(f"{filled_service}/v1/jobs")["items"][0]
+    waiting = [{**job, "id": f"{k:08x}-0000-7000-8000-000000000000", "state": "queued", "started_at": None, "finished_at": None, "progress": 0} for k in (3, 2)]
+    running = {**waiting[0], "id": "00000001-0000-7000-8000-000000000000", "state": "running", "progress": 0.1}
+    page.route("**/v1/jobs?*", lambda route: route.fulfill(json={"items": [*waiting, running], "next_cursor": None}))
+    page.goto(f"{filled_service}/jobs")
+    cards = page.get_by_role("main").get_by_role("article")
+    expect(cards).to_have_count(3)
+    for k, n in enumerate((2, 1)):
+        expect(cards.nth(k)).to_contain_text(say(page, "job.ahead", n=n))
+    expect(cards.nth(2)).not_to_contain_text(said(page, "job.left"))
 
 
 def give_token(page, text):

@@ -78,6 +78,9 @@ codes! {
     StorageFull "storage_full" "The disk has too little free space."
         "Delete results that are no longer needed, or ask the operator of the service for more disk space. Then try \
          again."
+    OwnerStorageFull "owner_storage_full" "The stored files and open uploads of the owner have reached their limit."
+        "Delete films, libraries, flocks or virtual fish that are no longer needed, or cancel open uploads; `GET /v1/usage` \
+         shows what takes the space. Or ask the operator of the service for a higher limit (`--max-owner-bytes`)."
     // Analysis (docs/explanation/algorithms.md, "Refused footage").
     NothingMoves "nothing_moves" "No moving animal was found in the film."
         "Film an animal that moves and that differs from the background in color or brightness. Or send a picture of \
@@ -117,8 +120,9 @@ codes! {
     InputFailed "input_failed" "An input of this job does not exist: the job that makes it failed or was cancelled, \
                                 or the input was deleted."
         "Correct the error of that job, or send the input again. Then repeat the request."
-    CrashedWorker "crashed_worker" "The worker process crashed twice during this job, and the job is not repeated."
-        "Try other parameters or another film, and report the error to the operator of the service."
+    CrashedWorker "crashed_worker" "The job was the likely cause of three crashes, and is not tried again by itself."
+        "Try other parameters or another film, and report the error to the operator of the service. After the operator \
+         has removed the cause, `POST /v1/jobs/{id}/retry` starts the job again."
     AlreadyStored "already_stored" "The same film is stored already."
         "Use the stored footage; `GET /v1/footage` lists it."
     InvalidParams "invalid_params" "A parameter is unknown, malformed or out of its range."
@@ -148,8 +152,13 @@ codes! {
         "Send the body again. Uploads through `/v1/uploads` continue where they were interrupted."
     RangeNotSatisfiable "range_not_satisfiable" "The requested range begins after the end of the file."
         "`Content-Range` in the response contains the size of the file."
+    PreconditionFailed "precondition_failed" "`If-Match` names another version than the current one."
+        "Get the resource again, and repeat the request with its `ETag`, or without `If-Match`. Writes accept only `*`."
     AlreadyFinished "already_finished" "The job has ended and cannot be cancelled."
         "No action is needed. Delete the result if it is not needed."
+    RetryRefused "retry_refused" "The job cannot be tried again."
+        "`detail` names the reason. Only jobs that were cancelled, or failed for a reason that may pass, can be tried \
+         again."
     IdempotencyKeyReused "idempotency_key_reused" "The Idempotency-Key was already used with another body."
         "Use a new key for a new request."
     RequestInProgress "request_in_progress" "The first request with this Idempotency-Key is still being processed."

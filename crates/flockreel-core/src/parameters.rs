@@ -33,6 +33,12 @@ pub trait Parameters: Serialize + DeserializeOwned + PartialEq + Default + ToSch
     }
 }
 
+/// Schema of a coordinate in the image of the footage, pixels. The limits are a free choice.
+#[derive(ToSchema)]
+#[schema(minimum = -100000, maximum = 100000)]
+#[expect(dead_code, reason = "it only describes numbers in the schema")]
+pub(crate) struct CoordinatePx(f64);
+
 /// JSON Schema of a type, with the schemas that it refers to.
 pub struct Schemas {
     root: Value,
@@ -108,10 +114,10 @@ fn check_number(name: &str, schema: &Value, value: f64) -> Result<(), String> {
     let minimum = limit("minimum").unwrap_or(f64::NEG_INFINITY);
     let maximum = limit("maximum").unwrap_or(f64::INFINITY);
     let rule = if !(minimum..=maximum).contains(&value) {
-        if maximum.is_finite() {
-            format!("lie in {minimum}..={maximum}")
-        } else {
-            format!("be at least {minimum}")
+        match (minimum.is_finite(), maximum.is_finite()) {
+            (true, true) => format!("lie in {minimum}..={maximum}"),
+            (true, false) => format!("be at least {minimum}"),
+            (false, _) => format!("be at most {maximum}"),
         }
     } else if let Some(limit) = limit("exclusiveMinimum").filter(|&limit| value <= limit) {
         format!("be above {limit}")

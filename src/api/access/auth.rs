@@ -15,13 +15,19 @@ use axum::response::{IntoResponse, Response};
 
 use super::caller::{Caller, Proof};
 use super::cookie::session_cookie;
+use super::held_body::hold_until_sent;
 use super::link::link_caller;
+use super::open_requests::Client;
 use crate::api::page::PLACES;
 use crate::api::{AppState, Problem};
 use crate::jobs::clock::now_ms;
+use crate::store::owners::Account;
 use crate::store::tokens::secret::Presented;
 use crate::store::tokens::{Scope, Token};
 use flockreel_core::code::Code;
+
+/// Says which of the limits was reached.
+const TOO_MANY_OPEN: &str = "too many requests of this client are open at once: close event streams and downloads that are not needed";
 
 /// Address of the other end of the connection. Behind a proxy, it is the address of the proxy.
 #[derive(Clone, Copy, Debug)]
@@ -35,8 +41,8 @@ pub(in crate::api) async fn authenticate(
     next: Next,
 ) -> Response {
     let peer = request.extensions().get::<Peer>().copied();
-    let answer = run_authenticated(&state, request, next).await;
     let Peer(peer) = peer.unwrap_or(Peer(Ipv4Addr::UNSPECIFIED.into()));
+    let answer = run_authenticated(&state, peer, request, next).await;
     let is_refused = answer.status() == StatusCode::UNAUTHORIZED;
     if is_refused && !state.rates.take_refusal(peer, Instant::now()) {
         return Problem::from(Code::RateLimited).into_response();
@@ -44,9 +50,15 @@ pub(in crate::api) async fn authenticate(
     answer
 }
 
-async fn run_authenticated(state: &AppState, request: Request, next: Next) -> Response {
+async fn run_authenticated(
+    state: &AppState,
+    peer: IpAddr,
+    request: Request,
+    next: Next,
+) -> Response {
     if is_open(request.uri().path()) || is_place(&request) {
-        return next.run(request).await;
+        let run = next.run(request);
+        return run_counted(state, Client::Address(peer), run).await;
     }
     let (mut parts, body) = request.into_parts();
     match caller(state, &parts).await {
@@ -54,10 +66,29 @@ async fn run_authenticated(state: &AppState, request: Request, next: Next) -> Re
             Problem::from(Code::RateLimited).into_response()
         }
         Ok(caller) => {
+            let Account { owner, quota } = caller.account.clone();
             parts.extensions.insert(caller);
-            next.run(Request::from_parts(parts, body)).await
+            let run = next.run(Request::from_parts(parts, body));
+            // Local requests without a token have no limits.
+            match quota {
+                None => run.await,
+                Some(_) => run_counted(state, Client::Owner(owner), run).await,
+            }
         }
         Err(problem) => problem.into_response(),
+    }
+}
+
+/// Runs a request that counts as open until its response is sent. Refuses it with `rate_limited` if the client has
+/// too many open requests.
+async fn run_counted(
+    state: &AppState,
+    client: Client,
+    run: impl Future<Output = Response>,
+) -> Response {
+    match state.open_requests.open(client) {
+        Some(open) => hold_until_sent(run.await, open),
+        None => Problem::new(Code::RateLimited, TOO_MANY_OPEN.to_owned()).into_response(),
     }
 }
 
@@ -161,7 +192,6 @@ mod tests {
     #[test]
     fn paths_not_listed_need_a_caller() {
         for path in [
-            "/",
             "/static/js/main.js",
             "/vendor/x.js",
             "/v1/session",

@@ -60,11 +60,12 @@ impl Caller {
 
     /// Returns the caller of a signed link to data of `owner`. The caller can only read. `link` has checked
     /// that the signature covers the path of the request.
-    pub(super) fn with_link(owner: Owner) -> Caller {
+    pub(super) fn with_link(owner: Owner, path: &str) -> Caller {
         Caller {
             owners: OwnerFilter::One(owner),
             account: Account {
-                owner: Owner("link".to_owned()),
+                // Every link has limits of its own. A name with a slash belongs to no token.
+                owner: Owner(format!("link {path}")),
                 quota: Some(0),
             },
             scope: Scope::Read,

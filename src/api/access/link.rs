@@ -41,7 +41,7 @@ pub(super) async fn link_caller(
         return Ok(None);
     };
     let owner = state.context.store.owner_of_flock(flock).await?;
-    Ok(owner.map(Caller::with_link))
+    Ok(owner.map(|owner| Caller::with_link(owner, uri.path())))
 }
 
 /// Returns the flock that a path belongs to.

@@ -14,10 +14,10 @@ use uuid::Uuid;
 use super::analyses::AnalysisOverrides;
 use super::download::names::{saved_as, stem};
 use super::download::{Download, Files, find as find_file};
-use super::extract::{Access, Conditions, FileOf, Id};
+use super::extract::{Access, Conditions, FileOf, Id, Json};
 use super::paging::{FilmQuery, Filtered, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
-use super::resources::{FileView, Reference, ResultView, View};
+use super::resources::{FileView, Reference, ResultChange, ResultView, View};
 use super::timestamp::rfc3339;
 use crate::jobs::flock::Summary;
 use crate::store::jobs::JobState;
@@ -42,6 +42,9 @@ const FILES: Files = &[
     ("video.webm", "video/webm"),
     ("video.mp4", "video/mp4"),
 ];
+
+/// Names of the pictures of a flock in lists. To see them there is no use of the flock.
+const LIST_PICTURES: [&str; 2] = ["thumb.webp", "poster.png"];
 
 /// Library and parameters of a flock.
 ///
@@ -122,6 +125,10 @@ pub(super) struct FlockView {
     name: String,
     /// Whether it was made from the sample of an empty data folder.
     sample: bool,
+    /// Whether it stays even if nobody uses it.
+    pinned: bool,
+    /// Time of the last use, exact to the hour, RFC 3339 in UTC.
+    used_at: String,
     /// Size of all files, bytes.
     size_bytes: i64,
     /// Time of creation, RFC 3339 in UTC.
@@ -160,6 +167,23 @@ pub(super) async fn get_flock(access: Access, Id(id): Id) -> JsonAnswer<FlockVie
     access.get_result(id).await
 }
 
+/// Pin a flock, or unpin it.
+///
+/// A pinned flock stays even if nobody uses it, and so does everything that it was made from.
+#[utoipa::path(patch, path = "/v1/flocks/{id}", params(("id" = Uuid, Path)), request_body = ResultChange,
+    responses(
+    (status = 200, body = FlockView),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn change_flock(
+    access: Access,
+    Id(id): Id,
+    Json(change): Json<ResultChange>,
+) -> JsonAnswer<FlockView> {
+    access.change_result(id, change).await
+}
+
 /// Delete a flock and its job.
 #[utoipa::path(delete, path = "/v1/flocks/{id}", params(("id" = Uuid, Path)), responses(
     (status = 204, description = "deleted"),
@@ -196,6 +220,9 @@ pub(super) async fn get_flock_file(
 ) -> Answer {
     let (name, media_type) = find_file(FILES, &name)?;
     let flock = access.find::<Flock>(id).await?;
+    if !LIST_PICTURES.contains(&name) {
+        access.note_use::<Flock>(&flock);
+    }
     let download = Download {
         folder: &flock.folder,
         name,
@@ -238,6 +265,8 @@ impl View for FlockView {
             library_id: row.library_id,
             name: row.name,
             sample: row.sample,
+            pinned: row.pinned,
+            used_at: rfc3339(row.used_ms),
             size_bytes: row.size_bytes,
             created_at: rfc3339(row.created_ms),
             params: super::stored(&row.params)?,

@@ -23,7 +23,7 @@ const MAX_PREVIEWED_POSES: u64 = 200_000;
 /// with `Accept: application/vnd.flockreel.plan`. Nothing is stored. The library must exist.
 ///
 /// The number of individuals (20 if `count` is null) times `frames` is at most 200,000, else the call fails
-/// with `invalid_params`. Previews run one at a time. A preview that cannot start within 20 seconds fails
+/// with `invalid_params`. Previews run one at a time, and owners take turns. A preview that cannot start within 20 seconds fails
 /// with `busy`. The computation ends when the client closes the connection. `Server-Timing` tells how long it
 /// took.
 #[utoipa::path(post, path = "/v1/flocks/preview", request_body = FlockRequest, responses(
@@ -46,6 +46,7 @@ pub(in crate::api) async fn preview_flock(
     }
     let library_id = access.id_of::<Library>(request.library_id).await?;
     let library = access.find::<Library>(library_id).await?;
+    access.note_use::<Library>(&library);
     let accepted = headers.get(header::ACCEPT);
     let accepted = accepted.and_then(|value| value.to_str().ok());
     let mut types = accepted.unwrap_or_default().split(',');
@@ -56,9 +57,9 @@ pub(in crate::api) async fn preview_flock(
     } else {
         ("application/json", flock_json::write)
     };
-    let context = &access.state.context;
+    let (context, owner) = (&access.state.context, &access.caller.account.owner);
     let begun = Instant::now();
-    let preview = synchronous::preview_flock(context, &library, params, write).await?;
+    let preview = synchronous::preview_flock(context, owner, &library, params, write).await?;
     let timing = timing(&preview, begun.elapsed());
     let headers = [
         (header::CONTENT_TYPE, media_type),

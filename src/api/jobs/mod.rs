@@ -1,6 +1,7 @@
 //! Jobs: their state and cancellation, and the responses about jobs that other routes share.
 
 pub(super) mod events; // server-sent events
+pub(super) mod retry; // another attempt
 
 pub(super) mod wait; // Prefer: wait=N
 
@@ -43,6 +44,8 @@ pub(super) struct JobView {
     attempt: i64,
     /// Whether the job was asked to stop while running.
     cancel_requested: bool,
+    /// Whether `POST /v1/jobs/{id}/retry` would start the job again.
+    retriable: bool,
     /// Reason of the failure; null unless the job failed.
     error: Option<JobFailure>,
     /// Time at which the job was queued, RFC 3339 in UTC.
@@ -213,7 +216,8 @@ pub(super) async fn job_to_follow(
 ) -> Result<Option<JobId>, Problem> {
     let store = access.store();
     let library = store.resource::<Library>(library_id.0, &access.caller.owners);
-    if library.await?.is_some() {
+    if let Some(library) = library.await? {
+        access.note_use::<Library>(&library);
         return Ok(None);
     }
     match store
@@ -262,6 +266,7 @@ impl From<JobRow> for JobView {
             progress: row.progress,
             attempt: row.attempt,
             cancel_requested: row.cancel_requested,
+            retriable: row.is_retriable(),
             error: row.failure().map(|failure| JobFailure {
                 picture: row.has_picture.then(|| format!("{path}/{FILE_NAME}")),
                 code: failure.code.name(),

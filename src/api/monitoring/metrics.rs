@@ -6,6 +6,7 @@
 
 use std::fmt;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use axum::Router;
 use axum::body::Body;
@@ -17,7 +18,7 @@ use axum::routing::get;
 use prometheus_client::collector::Collector;
 use prometheus_client::encoding::text::encode;
 use prometheus_client::encoding::{DescriptorEncoder, EncodeLabelSet, EncodeMetric};
-use prometheus_client::metrics::counter::ConstCounter;
+use prometheus_client::metrics::counter::{ConstCounter, Counter};
 use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::info::Info;
@@ -44,6 +45,11 @@ struct Jobs {
 }
 
 #[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
+struct Limit {
+    limit: &'static str,
+}
+
+#[derive(Clone, Debug, Hash, PartialEq, Eq, EncodeLabelSet)]
 struct Stored {
     noun: &'static str,
 }
@@ -55,6 +61,8 @@ pub(in crate::api) struct Metrics {
     jobs: Family<Jobs, Gauge>,
     oldest_queued: Gauge,
     stored: Family<Stored, Gauge>,
+    announced: Gauge,
+    refusals: Family<Limit, Counter>,
 }
 
 impl Metrics {
@@ -62,7 +70,8 @@ impl Metrics {
     pub(in crate::api) fn new(meters: &Meters, requests: &Requests) -> Metrics {
         let mut registry = process_registry(meters);
         let (jobs, stored) = (Family::default(), Family::default());
-        let oldest_queued = Gauge::default();
+        let (oldest_queued, announced) = (Gauge::default(), Gauge::default());
+        let refusals = Family::default();
         registry.register("flockreel_jobs", "Jobs, by kind and state", jobs.clone());
         registry.register_with_unit(
             "flockreel_queue_oldest",
@@ -76,6 +85,17 @@ impl Metrics {
             Unit::Bytes,
             stored.clone(),
         );
+        registry.register_with_unit(
+            "flockreel_announced",
+            "Announced sizes of open uploads and of bodies that are being received",
+            Unit::Bytes,
+            announced.clone(),
+        );
+        registry.register(
+            "flockreel_space_refusals",
+            "Uploads and results refused for lack of space, by limit",
+            refusals.clone(),
+        );
         requests.register(&mut registry);
         let registry = Arc::new(registry);
         Metrics {
@@ -83,11 +103,13 @@ impl Metrics {
             jobs,
             oldest_queued,
             stored,
+            announced,
+            refusals,
         }
     }
 
     /// Updates the metrics that describe the store.
-    fn update(&self, census: &Census, now_ms: i64) {
+    fn update(&self, census: &Census, n_refusals: [u64; 2], now_ms: i64) {
         for (kind, state) in Kind::ALL
             .into_iter()
             .flat_map(|kind| JobState::ALL.map(|state| (kind, state)))
@@ -105,6 +127,11 @@ impl Metrics {
         self.oldest_queued.set(waited_ms.max(0) / 1000);
         for &(noun, n_bytes) in &census.stored_bytes {
             self.stored.get_or_create(&Stored { noun }).set(n_bytes);
+        }
+        self.announced.set(census.announced_bytes);
+        for (limit, n) in ["owner", "disk"].into_iter().zip(n_refusals) {
+            let refusals = self.refusals.get_or_create(&Limit { limit });
+            refusals.inner().store(n, Ordering::Relaxed);
         }
     }
 }
@@ -175,8 +202,9 @@ fn process_registry(meters: &Meters) -> Registry {
 }
 
 async fn text(state: &AppState) -> Result<Response<Body>, Problem> {
-    let census = state.context.store.census().await?;
-    state.metrics.update(&census, now_ms());
+    let store = &state.context.store;
+    let census = store.census().await?;
+    state.metrics.update(&census, store.n_refusals(), now_ms());
     encoded(&state.metrics.registry)
 }
 

@@ -22,7 +22,7 @@ const TAGS: [(&str, &str); 9] = [
     ("fish", "Virtual fish that move as the animal did."),
     ("jobs", "Queued work, its progress and its failures."),
     ("session", "Signing in of browsers."),
-    ("service", "Error codes, health and metrics."),
+    ("service", "Used space, error codes, health and metrics."),
 ];
 
 /// Adds a tag to every operation, and an example to every JSON body that needs no secret.
@@ -72,6 +72,7 @@ fn example(path: &str) -> Option<(HttpMethod, Value)> {
         "/v1/fish" => post(json!({"library_id": "sample"})),
         "/v1/flocks/{id}/links" => post(json!({"file": "video.mp4", "expires_s": 3600})),
         "/v1/footage/{id}" => Some((HttpMethod::Patch, json!({"name": "zebra finch.mp4"}))),
+        "/v1/flocks/{id}" => Some((HttpMethod::Patch, json!({"pinned": true}))),
         _ => None,
     }
 }

@@ -1,9 +1,10 @@
 //! The accept loop and the graceful stop (docs/explanation/promises.md, "Slow clients" and "Graceful stop").
 //!
 //! `axum::serve` installs no timer, so the header timeout of hyper would have no effect. This loop installs
-//! one. If all connections are in use, a few more are accepted for one response each: `busy`, or that of
-//! /healthz.
+//! one. If all connections are in use, idle ones give way. If all have a request under way, a few more are
+//! accepted for one response each: `busy`, or that of /healthz.
 
+mod idle;
 mod slow_clients;
 
 use std::io;
@@ -25,17 +26,20 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tower::ServiceExt;
 
+use idle::{IdleConnections, Idleness};
 pub(super) use slow_clients::is_too_slow;
-use slow_clients::{MinRateBody, WriteTimeout};
+use slow_clients::{MinRateBody, Unread, WriteTimeout};
 
 use super::Problem;
-use super::access::Peer;
+use super::access::{Peer, hold_until_sent};
 use flockreel_core::code::Code;
 
 /// Largest number of connections that are served normally. Free choice.
 const MAX_CONNECTIONS: usize = 2048;
 /// Largest number of further connections, which get one response each. Free choice.
 const MAX_OVERFLOW_CONNECTIONS: usize = 64;
+/// Longest wait for an idle connection to close. It needs no message from its client.
+const GIVE_WAY_TIMEOUT: Duration = Duration::from_millis(100);
 /// Longest wait for the head of a request, and for the next request on an idle connection. Free choice.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(30);
 /// Size of the read buffer for the head of a request, bytes. Free choice.
@@ -96,6 +100,7 @@ struct Acceptor {
     overflow_router: Router,
     permits: Arc<Semaphore>,
     overflow_permits: Arc<Semaphore>,
+    idle: IdleConnections,
 }
 
 impl Acceptor {
@@ -111,6 +116,7 @@ impl Acceptor {
             router,
             permits: Arc::new(Semaphore::new(n_permits)),
             overflow_permits: Arc::new(Semaphore::new(n_overflow_permits)),
+            idle: IdleConnections::default(),
         }
     }
 
@@ -129,9 +135,14 @@ impl Acceptor {
                     } else {
                         (builder.clone(), self.router.clone())
                     };
-                    let stop = stop.clone();
+                    let line = if connection.is_overflow {
+                        &IdleConnections::default()
+                    } else {
+                        &self.idle
+                    };
+                    let (stop, idleness) = (stop.clone(), line.enter());
                     connections.spawn(async move {
-                        answer(&builder, connection.stream, router, stop).await;
+                        answer(&builder, connection.stream, router, stop, idleness).await;
                         drop(connection.permit);
                     });
                 }
@@ -155,9 +166,21 @@ impl Acceptor {
         };
         let (stream, _) = self.listener.accept().await?;
         stream.set_nodelay(true)?;
-        // Another connection may have closed during the wait.
-        if is_overflow && let Some(usual) = usual_permit() {
-            (permit, is_overflow) = (usual, false);
+        // Another connection may have closed during the wait, or may close now.
+        if is_overflow {
+            let usual = match usual_permit() {
+                None if self.idle.close_longest() => {
+                    let closed = self.permits.clone().acquire_owned();
+                    timeout(GIVE_WAY_TIMEOUT, closed)
+                        .await
+                        .ok()
+                        .and_then(Result::ok)
+                }
+                usual => usual,
+            };
+            if let Some(usual) = usual {
+                (permit, is_overflow) = (usual, false);
+            }
         }
         Ok(Connection {
             stream,
@@ -183,26 +206,43 @@ async fn answer_overflow(request: Request, next: Next) -> Response {
     }
 }
 
-/// Serves one connection to its end. Once `stop` is cancelled, only the current request is finished.
+/// Serves one connection to its end. Once `stop` is cancelled, only the current request is finished. An idle
+/// connection ends at once if it has to give way.
 async fn answer(
     builder: &Builder<TokioExecutor>,
     stream: TcpStream,
     router: Router,
     stop: CancellationToken,
+    idleness: Arc<Idleness>,
 ) {
     let peer = stream.peer_addr().map(|address| Peer(address.ip())).ok();
-    let router = router.map_request(move |mut request: Request<Incoming>| {
-        if let Some(peer) = peer {
-            request.extensions_mut().insert(peer);
-        }
-        request.map(MinRateBody::new)
-    });
+    let unread = Unread::default();
+    let stream = WriteTimeout::new(stream, unread.clone());
+    let (begun, ending) = (idleness.clone(), idleness.clone());
+    // HTTP/1 answers one request after the other, so a response belongs to the request before it.
+    let router = router
+        .map_request(move |mut request: Request<Incoming>| {
+            begun.end();
+            if let Some(peer) = peer {
+                request.extensions_mut().insert(peer);
+            }
+            request.map(|body| MinRateBody::new(body, unread.clone()))
+        })
+        .map_response(move |response| hold_until_sent(response, ending.busy()));
     let service = TowerToHyperService::new(router);
-    let connection = builder.serve_connection(TokioIo::new(WriteTimeout::new(stream)), service);
+    let connection = builder.serve_connection(TokioIo::new(stream), service);
     let mut connection = std::pin::pin!(connection);
     let ended = tokio::select! {
         ended = connection.as_mut() => ended,
         () = stop.cancelled() => {
+            connection.as_mut().graceful_shutdown();
+            connection.await
+        }
+        () = idleness.must_close() => {
+            if !idleness.is_busy() {
+                return;
+            }
+            // A request has just begun.
             connection.as_mut().graceful_shutdown();
             connection.await
         }
@@ -251,21 +291,32 @@ mod tests {
         (connection, line.to_owned())
     }
 
-    #[tokio::test]
-    async fn connections_beyond_the_limit_get_503_except_for_healthz() {
+    /// Accepts one connection and two beyond the limit.
+    async fn small_service() -> std::net::SocketAddr {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
+        let endless = || async {
+            let pieces = futures_util::stream::pending::<io::Result<bytes::Bytes>>();
+            axum::body::Body::from_stream(pieces)
+        };
         let router = Router::new()
             .route("/healthz", get(|| async { "well" }))
+            .route("/endless", get(endless))
             .route("/", get(|| async { "the page" }));
         let acceptor = Acceptor::new(listener, router, 1, 2);
-        let (connections, never) = (TaskTracker::new(), CancellationToken::new());
-        let accepting = tokio::spawn(async move {
+        tokio::spawn(async move {
+            let (connections, never) = (TaskTracker::new(), CancellationToken::new());
             acceptor
                 .accept_all(&keep_alive_builder(), &connections, &never)
                 .await;
         });
-        let (taken, first) = ask(address, "/").await;
+        address
+    }
+
+    #[tokio::test]
+    async fn connections_beyond_the_limit_get_503_except_for_healthz() {
+        let address = small_service().await;
+        let (taken, first) = ask(address, "/endless").await;
         assert_eq!(first, "HTTP/1.1 200 OK");
         for _ in 0..4 {
             let (_closed, other) = ask(address, "/").await;
@@ -277,6 +328,17 @@ mod tests {
         sleep(Duration::from_millis(50)).await;
         let (_open, next) = ask(address, "/").await;
         assert_eq!(next, "HTTP/1.1 200 OK");
-        accepting.abort();
+    }
+
+    #[tokio::test]
+    async fn idle_connection_gives_way() {
+        let address = small_service().await;
+        let _silent = TcpStream::connect(address).await.unwrap();
+        let mut open = Vec::new();
+        for _ in 0..3 {
+            let (connection, line) = ask(address, "/").await;
+            assert_eq!(line, "HTTP/1.1 200 OK");
+            open.push(connection);
+        }
     }
 }

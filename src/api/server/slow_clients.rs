@@ -3,9 +3,15 @@
 //! Every client occupies one of a limited number of connections. It must therefore read a part of the
 //! response from time to time, and send a body at a minimum average rate. Time during which the client waits
 //! for the server does not count.
+//!
+//! A connection lingers if its last request was answered before its body was read: the rest of the body is
+//! received and dropped for a while. Otherwise a client that is still sending would see a broken connection
+//! instead of the response.
 
 use std::io;
 use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Poll, ready};
 use std::time::Duration;
 
@@ -20,17 +26,30 @@ const GRACE: Duration = Duration::from_secs(30);
 /// Minimum average rate of a body, bytes per second. Any line that is used to send videos is faster.
 const MIN_BYTES_PER_S: f64 = 1024.0;
 
-/// A connection whose writes fail if the client reads nothing for too long.
+/// Longest time that a connection lingers, and longest pause of its client. Those of nginx.
+const MAX_LINGER: Duration = Duration::from_secs(30);
+const MAX_LINGER_PAUSE: Duration = Duration::from_secs(5);
+
+/// Whether the last body of a connection was dropped before its end.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Unread(Arc<AtomicBool>);
+
+/// A connection whose writes fail if the client reads nothing for too long, and which may linger.
 pub(super) struct WriteTimeout<S> {
     stream: S,
+    unread: Unread,
+    /// End of lingering, and end of the client's pause.
+    lingering: Option<(Instant, Pin<Box<Sleep>>)>,
     max_wait: Duration,
     waiting: Option<Pin<Box<Sleep>>>,
 }
 
 impl<S> WriteTimeout<S> {
-    pub(super) fn new(stream: S) -> WriteTimeout<S> {
+    pub(super) fn new(stream: S, unread: Unread) -> WriteTimeout<S> {
         WriteTimeout {
             stream,
+            unread,
+            lingering: None,
             max_wait: MAX_WRITE_WAIT,
             waiting: None,
         }
@@ -55,7 +74,30 @@ impl<S> WriteTimeout<S> {
     }
 }
 
-impl<S: AsyncWrite + Unpin> AsyncWrite for WriteTimeout<S> {
+impl<S: AsyncRead + Unpin> WriteTimeout<S> {
+    /// Receives and drops what the client still sends, until it closes the connection or takes too long.
+    fn poll_linger(&mut self, context: &mut Context<'_>) -> Poll<()> {
+        let mut bytes = [0; 16 << 10];
+        let (end, pause) = self.lingering.get_or_insert_with(|| {
+            let end = Instant::now() + MAX_LINGER;
+            (end, Box::pin(sleep(MAX_LINGER_PAUSE)))
+        });
+        while Instant::now() < *end {
+            let mut buffer = ReadBuf::new(&mut bytes);
+            match Pin::new(&mut self.stream).poll_read(context, &mut buffer) {
+                Poll::Ready(Ok(())) if !buffer.filled().is_empty() => {
+                    let until = Instant::now() + MAX_LINGER_PAUSE;
+                    pause.as_mut().reset(until.min(*end));
+                }
+                Poll::Ready(_) => return Poll::Ready(()),
+                Poll::Pending => return pause.as_mut().poll(context),
+            }
+        }
+        Poll::Ready(())
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> AsyncWrite for WriteTimeout<S> {
     fn poll_write(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -83,7 +125,13 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for WriteTimeout<S> {
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(context)
+        if self.lingering.is_none() {
+            ready!(Pin::new(&mut self.stream).poll_shutdown(context))?;
+        }
+        if self.unread.0.load(Ordering::Relaxed) {
+            ready!(self.poll_linger(context));
+        }
+        Poll::Ready(Ok(()))
     }
 }
 
@@ -115,8 +163,10 @@ pub(in crate::api) fn is_too_slow(error: &dyn std::error::Error) -> bool {
 }
 
 /// A body that fails with [`TooSlow`] if the total waiting time is too long for the number of bytes received.
-pub(super) struct MinRateBody<B> {
+pub(super) struct MinRateBody<B: Body> {
     body: B,
+    unread: Unread,
+    is_at_end: bool,
     grace: Duration,
     /// Total time spent waiting for the chunks received so far.
     waited: Duration,
@@ -125,10 +175,14 @@ pub(super) struct MinRateBody<B> {
     n_bytes: f64,
 }
 
-impl<B> MinRateBody<B> {
-    pub(super) fn new(body: B) -> MinRateBody<B> {
+impl<B: Body> MinRateBody<B> {
+    /// Returns the body of the next request of a connection.
+    pub(super) fn new(body: B, unread: Unread) -> MinRateBody<B> {
+        unread.0.store(false, Ordering::Relaxed);
         MinRateBody {
             body,
+            unread,
+            is_at_end: false,
             grace: GRACE,
             waited: Duration::ZERO,
             waiting: None,
@@ -158,6 +212,7 @@ where
                 .as_ref()
                 .and_then(|frame| frame.as_ref().ok()?.data_ref());
             this.n_bytes += data.map_or(0, Buf::remaining) as f64;
+            this.is_at_end = frame.is_none();
             return Poll::Ready(frame.map(|frame| frame.map_err(Into::into)));
         }
         let allowed = this.grace + Duration::from_secs_f64(this.n_bytes / MIN_BYTES_PER_S);
@@ -177,6 +232,13 @@ where
     }
 }
 
+impl<B: Body> Drop for MinRateBody<B> {
+    fn drop(&mut self) {
+        let is_unread = !self.is_at_end && !self.body.is_end_stream();
+        self.unread.0.store(is_unread, Ordering::Relaxed);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use axum::body::Body as AnyBody;
@@ -191,7 +253,7 @@ mod tests {
     #[tokio::test]
     async fn write_times_out_only_if_the_client_reads_nothing() {
         let (ours, mut theirs) = duplex(16);
-        let mut ours = WriteTimeout::new(ours);
+        let mut ours = WriteTimeout::new(ours, Unread::default());
         ours.max_wait = SOON;
         let read = async {
             for _ in 0..8 {
@@ -212,7 +274,7 @@ mod tests {
             tokio::time::sleep(SOON / 10).await;
             (k < 100).then(|| (Ok::<_, io::Error>(Bytes::from(vec![7; n_bytes])), k + 1))
         });
-        let mut body = MinRateBody::new(AnyBody::from_stream(pieces));
+        let mut body = MinRateBody::new(AnyBody::from_stream(pieces), Unread::default());
         body.grace = SOON;
         body
     }
@@ -237,7 +299,7 @@ mod tests {
         let body = AnyBody::from_stream(futures_util::stream::iter(
             [b"x"; 3].map(|piece| Ok::<_, io::Error>(Bytes::from_static(piece))),
         ));
-        let mut body = MinRateBody::new(body);
+        let mut body = MinRateBody::new(body, Unread::default());
         body.grace = SOON / 10;
         let mut pieces = AnyBody::new(body).into_data_stream();
         while let Some(piece) = pieces.next().await {

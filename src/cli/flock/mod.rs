@@ -30,7 +30,7 @@ pub struct Args {
     outputs: Outputs,
     #[arg(long, help = set::parameter_help::<Params>("count"))]
     count: Option<u32>,
-    #[arg(long, value_name = "BL", help = set::parameter_help::<Params>("spacing_bl"))]
+    #[arg(long, value_name = "BL", value_parser = set::finite, help = set::parameter_help::<Params>("spacing_bl"))]
     spacing: Option<f64>,
     #[arg(long, help = set::parameter_help::<Params>("frames"))]
     frames: Option<u32>,

@@ -35,9 +35,9 @@ pub(super) struct Outputs {
     background: Option<String>,
     #[arg(long, help = set::parameter_help::<Params>("render.cut"))]
     cut: Option<String>,
-    #[arg(long, value_name = "SHARE", help = set::parameter_help::<Params>("render.haze_per_bl"))]
+    #[arg(long, value_name = "SHARE", value_parser = set::finite, help = set::parameter_help::<Params>("render.haze_per_bl"))]
     haze: Option<f64>,
-    #[arg(long, value_name = "SHARE", help = set::parameter_help::<Params>("render.shadow"))]
+    #[arg(long, value_name = "SHARE", value_parser = set::finite, help = set::parameter_help::<Params>("render.shadow"))]
     shadow: Option<f64>,
     /// Also write a video that marks the position and heading of every boid.
     #[arg(long, value_name = "MP4")]

@@ -19,9 +19,9 @@ use utoipa::ToSchema;
 use self::film::{Backdrop, Film};
 use self::target::{Output, Target};
 use super::analysis::Advice;
-use super::{Attempt, Error, JobInput, Product, Stages};
+use super::lane::Extent;
+use super::{Attempt, Error, JobInput, Product, Stages, Subject};
 use crate::store::jobs::Kind;
-use crate::store::jobs::finish::Source;
 use flockreel_core::flock::composite::params::{Format, Render};
 use flockreel_core::flock::{self, Flock, Params, plan_flock};
 use flockreel_core::formats::{flock_json, flock_plan, svg};
@@ -35,6 +35,9 @@ pub const STAGES: Stages = &[
     ("planning", 0.3),
     ("rendering", 0.6),
 ];
+
+/// Area of a sprite for the estimate of the cost, pixels. Free choice.
+const SPRITE_PX: f64 = 10_000.0;
 
 /// Input of a flock.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -68,9 +71,25 @@ impl JobInput for Input {
     const KIND: Kind = Kind::Flock;
     type ResultId = FlockId;
 
+    fn subject(&self) -> Option<Subject> {
+        Some(Subject::Library(self.library_id))
+    }
+
+    /// Every frame is encoded once for each file, and every individual is planned and drawn.
+    fn cost_px(&self, library: Option<Extent>) -> Option<f64> {
+        let render = &self.params.render;
+        let film = Extent {
+            n_frames: self.params.frames as usize,
+            image_size_px: render.size_px.unwrap_or(library?.image_size_px),
+        };
+        let n_films = targets(Path::new(""), render).len() + usize::from(render.ground_truth);
+        let n_sprites = f64::from(self.params.frames) * f64::from(self.params.most_individuals());
+        Some(n_films as f64 * film.film_px() + n_sprites * SPRITE_PX)
+    }
+
     fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
-        let library = attempt.library(self.library_id)?;
-        let flock = plan_flock(&library, &self.params, attempt.listener)?;
+        let library = attempt.library()?;
+        let flock = plan_flock(&library, &self.params, attempt.reporter)?;
         let folder = attempt.folder();
         let mut file = BufWriter::new(File::create(folder.join("flock.json"))?);
         flock_json::write_to(&flock, &mut file)?;
@@ -90,7 +109,7 @@ impl JobInput for Input {
                 .collect(),
         };
         Ok(Product {
-            source: Source::Resource(self.library_id.0),
+            film: None,
             params: serde_json::to_string(&flock.params)?,
             summary: serde_json::to_string(&summary)?,
         })
@@ -103,7 +122,7 @@ fn render(attempt: &Attempt, library: &Library, flock: &Flock) -> Result<(), Err
         library,
         flock,
         backdrop: Backdrop::FromParams,
-        progress: attempt.listener,
+        progress: attempt.reporter,
     };
     let truth = folder.join("ground-truth");
     film.thumb(&folder.join("thumb.webp"))?;

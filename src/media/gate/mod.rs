@@ -6,24 +6,26 @@
 //! something else. A slow caller and a busy machine do not use up a decoder's time. The limit on processor time
 //! stops a child that computes forever.
 
-mod processor_wait;
+mod group; // a process group
+mod processor; // processor time of a process
 
 use std::io::{self, Read, Write};
-use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
+use std::os::fd::{AsFd, BorrowedFd};
 use std::path::PathBuf;
 use std::process::{self, ChildStdin, ChildStdout, Stdio};
-use std::sync::{Mutex, OnceLock, PoisonError, mpsc};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec};
-use rustix::process::{Pid, PidfdFlags, Signal, getpriority_process, setpriority_process};
+use rustix::process::{Pid, getpriority_process, setpriority_process};
+
+pub use group::ProcessGroup;
 
 use super::error::Error;
 use super::exit::{Exit, hide_paths};
 use super::invocation::Invocation;
 use super::sandbox::{self, Policy};
-use processor_wait::processor_wait;
+use processor::{processor_time, processor_wait};
 
 /// Length of the kept end of a child's stderr, bytes. Free choice.
 const STDERR_TAIL_BYTES: usize = 8 << 10;
@@ -36,12 +38,7 @@ const EXIT_TIME: Duration = Duration::from_secs(30);
 
 /// A running child. Dropping it kills and reaps its whole group.
 pub(super) struct Child {
-    process: process::Child,
-    group: Pid,
-    /// After reaping, the process id may belong to another process.
-    reaped: bool,
-    /// Becomes readable when the process exits.
-    pidfd: OwnedFd,
+    group: ProcessGroup,
     stdin: Option<ChildStdin>,
     stdout: Option<ChildStdout>,
     /// Thread that returns the end of stderr.
@@ -52,6 +49,8 @@ pub(super) struct Child {
     stall_limit: Duration,
     /// Time in which the child waited for a processor, as far as it was added to the limits.
     credited: Duration,
+    /// Limit of the processor time of all threads.
+    processor_limit: Duration,
     /// Files given to the child. Their paths are removed from its messages, because users do not know them.
     files: Vec<PathBuf>,
 }
@@ -89,26 +88,14 @@ impl Child {
         let mut command = command(&invocation);
         command.stdin(stdin);
         sandbox::apply(&mut command, &policy, &tool.program_files).map_err(&failed)?;
-        let mut process = spawn(command).map_err(failed)?;
-        let group = Pid::from_child(&process);
-        inherit_niceness(group);
-        let pidfd = match rustix::process::pidfd_open(group, PidfdFlags::empty()) {
-            Ok(pidfd) => pidfd,
-            Err(errno) => {
-                kill_and_reap(&mut process, group);
-                return Err(Error::io("watching the media tool")(errno.into()));
-            }
-        };
-        let (stdin, stdout) = (process.stdin.take(), process.stdout.take());
+        let mut group = ProcessGroup::start(command).map_err(failed)?;
+        inherit_niceness(group.id());
+        let (stdin, stdout, stderr) = group.take_pipes();
         if let Some(stdout) = &stdout {
             enlarge_pipe(stdout);
         }
-        let stderr = process.stderr.take();
         Ok(Child {
-            process,
             group,
-            reaped: false,
-            pidfd,
             stdin,
             stdout,
             stderr: stderr.map(|pipe| std::thread::spawn(|| read_tail(pipe))),
@@ -116,6 +103,7 @@ impl Child {
             deadline: Instant::now() + invocation.time_limit,
             stall_limit: invocation.stall_limit,
             credited: Duration::ZERO,
+            processor_limit: Duration::from_secs(policy.cpu_s),
             files: [policy.input, policy.output]
                 .into_iter()
                 .flatten()
@@ -214,19 +202,19 @@ impl Child {
         };
         self.stdout = None;
         let watching = Error::io("watching the media tool");
-        let pidfd = self.pidfd.try_clone().map_err(watching)?;
+        let pidfd = self.group.as_fd().try_clone_to_owned().map_err(watching)?;
         let mut deadline = Instant::now() + time_limit;
         self.wait_for(pidfd.as_fd(), PollFlags::IN, &mut deadline)?;
-        // The child has exited but is not reaped, so its process id is still valid. Kill any processes that
-        // it started.
-        rustix::process::kill_process_group(self.group, Signal::KILL).ok();
-        let reaping = Error::io("reaping the media tool");
-        let status = self.process.wait().map_err(reaping)?;
-        self.reaped = true;
+        let used = processor_time(self.group.id());
+        let status = self
+            .group
+            .reap()
+            .map_err(Error::io("reaping the media tool"))?;
         let stderr_tail = self.stderr.take().map(|thread| thread.join());
         let stderr_tail = stderr_tail.and_then(Result::ok).unwrap_or_default();
         Ok(Exit {
             status,
+            used_up_processor_time: used >= self.processor_limit,
             stderr_tail: hide_paths(&self.files, stderr_tail),
         })
     }
@@ -264,7 +252,7 @@ impl Child {
     /// Time that was counted before is not counted again. Returns the extension. Fails with
     /// [`Error::TimeLimit`] if the child waited less than a tenth of the stall limit: it was slow by itself.
     fn extend_limits(&mut self) -> Result<Duration, Error> {
-        let waited = processor_wait(self.group).saturating_sub(self.credited);
+        let waited = processor_wait(self.group.id()).saturating_sub(self.credited);
         let extension = waited.min(self.stall_limit);
         if extension.is_zero() || extension < self.stall_limit / 10 {
             return Err(Error::TimeLimit);
@@ -273,14 +261,6 @@ impl Child {
         self.time_left += extension;
         self.deadline += extension;
         Ok(extension)
-    }
-}
-
-impl Drop for Child {
-    fn drop(&mut self) {
-        if !self.reaped {
-            kill_and_reap(&mut self.process, self.group);
-        }
     }
 }
 
@@ -300,40 +280,6 @@ fn command(invocation: &Invocation<'_>) -> process::Command {
         command.env("LD_TRACE_LOADED_OBJECTS", "1");
     }
     command
-}
-
-/// Kills the remaining group, then reaps the child, which may have exited before others of its group. The
-/// order matters: until the child is reaped, no other process can get its id.
-fn kill_and_reap(process: &mut process::Child, group: Pid) {
-    rustix::process::kill_process_group(group, Signal::KILL).ok();
-    process.wait().ok();
-}
-
-/// Starts a command on a thread that never ends. When the thread that started a child ends, the kernel treats
-/// that as the parent's death and kills the child.
-fn spawn(command: process::Command) -> io::Result<process::Child> {
-    type Request = (process::Command, mpsc::Sender<io::Result<process::Child>>);
-    static SPAWNER: OnceLock<Mutex<mpsc::Sender<Request>>> = OnceLock::new();
-    let spawner = SPAWNER.get_or_init(|| {
-        let (send, receive) = mpsc::channel::<Request>();
-        std::thread::spawn(move || {
-            for (mut command, reply) in receive {
-                if let Err(mpsc::SendError(Ok(mut orphan))) = reply.send(command.spawn()) {
-                    let group = Pid::from_child(&orphan);
-                    kill_and_reap(&mut orphan, group);
-                }
-            }
-        });
-        Mutex::new(send)
-    });
-    let gone = || io::Error::other("the thread that starts children is gone");
-    let (send, receive) = mpsc::channel();
-    let spawner = spawner
-        .lock()
-        .unwrap_or_else(PoisonError::into_inner)
-        .clone();
-    spawner.send((command, send)).map_err(|_closed| gone())?;
-    receive.recv().map_err(|_closed| gone())?
 }
 
 /// Gives the child the niceness of the calling thread; another thread starts the child. A decoder works for

@@ -94,14 +94,18 @@ pub(super) fn read_header(
         return Err(Error::CodecNotAllowed(codec.to_owned()));
     }
     match exit.check() {
-        Ok(_) => serde_json::from_slice(&json[..n_read])
-            .map_err(|error| Error::NotAVideo(error.to_string())),
+        Ok(_) => parse_header(&json[..n_read]),
         Err(Error::Crashed {
             status,
             stderr_tail,
         }) if status.starts_with("exit") => Err(Error::NotAVideo(stderr_tail)),
         Err(error) => Err(error),
     }
+}
+
+/// Parses the headers that ffprobe writes as JSON.
+pub(super) fn parse_header(json: &[u8]) -> Result<Value, Error> {
+    serde_json::from_slice(json).map_err(|error| Error::NotAVideo(error.to_string()))
 }
 
 /// Returns the codec that ffprobe was not allowed to open, from its error message.

@@ -28,7 +28,7 @@ use ending::Ending;
 use flockreel_core::raster::{ColorSpec, Matrix, Range};
 use header::{
     Orientation, alpha_decoder, check_codec, color_of, has_alpha, index_of, is_interlaced, number,
-    orientation_of, ratio, read_header, shown_size, text, video_streams,
+    orientation_of, parse_header, ratio, read_header, shown_size, text, video_streams,
 };
 use mov_index::MovIndex;
 use packets::{AllPackets, Packets, Pictures};
@@ -110,16 +110,48 @@ pub(in crate::media) fn probe(
         check_stream(only, limits, options)?;
     }
     let packets = packets.unwrap_or_else(read_packets)?;
-    let stream = choose_stream(&streams, &packets)?;
+    let decode = |packets: &Packets| Pictures::read(container, path, packets, limits);
+    judge(&file, &streams, &packets, decode, limits, options)
+}
+
+/// Checks a film as [`probe`] does, with the given output of ffprobe: the headers as JSON, the lines of the packets, and
+/// those of the decoded pictures. Starts no process; for fuzz targets.
+pub fn check_ffprobe_output(
+    path: &Path,
+    header: &[u8],
+    packets: &[u8],
+    pictures: &[u8],
+    limits: &Limits,
+) -> Result<(), Error> {
+    let file = inspect(path, limits)?;
+    let header = parse_header(header)?;
+    let streams = video_streams(&header, limits)?;
+    let packets = AllPackets::from_output(packets, limits)?;
+    let decode = |_: &Packets| Pictures::from_output(pictures, limits);
+    let options = ReadOptions::default();
+    judge(&file, &streams, &packets, decode, limits, &options).map(drop)
+}
+
+/// Refuses a film whose streams or packets exceed the limits. `decode` returns its pictures, if the packets do not
+/// determine them.
+fn judge(
+    file: &FileInfo,
+    streams: &[&Value],
+    packets: &AllPackets,
+    decode: impl Fn(&Packets) -> Result<Pictures, Error>,
+    limits: &Limits,
+    options: &ReadOptions,
+) -> Result<Probe, Error> {
+    let stream = choose_stream(streams, packets)?;
     let [width, height] = check_stream(stream, limits, options)?;
-    let times = PictureTimes::find(path, &file, stream, &packets, limits)?;
+    let times = PictureTimes::find(file, stream, packets, decode, limits)?;
     let (timeline, mut notices) = times.timeline(stream, limits, options)?;
     let n_pictures = times.times_s.len();
     if !limits.allow_truncated {
         notices.extend(file.notice(n_pictures));
     }
     Ok(Probe {
-        container,
+        container: file.container,
         stream_idx: index_of(stream),
         width: width as u32,
         height: height as u32,
@@ -203,10 +235,10 @@ impl PictureTimes {
     /// Finds the pictures from their packets or, if the packets do not determine them, by decoding. Refuses a
     /// film whose pictures are cut off or damaged, unless the limits allow it.
     fn find(
-        path: &Path,
         file: &FileInfo,
         stream: &Value,
         all: &AllPackets,
+        decode: impl Fn(&Packets) -> Result<Pictures, Error>,
         limits: &Limits,
     ) -> Result<PictureTimes, Error> {
         let packets = all.of_stream(index_of(stream));
@@ -219,7 +251,7 @@ impl PictureTimes {
         let has_plain_times = shown_s.is_some();
         let (times_s, is_damaged) = match shown_s {
             Some(shown_s) => (shown_s.into_iter().map(Some).collect(), false),
-            None => decode_times(path, file.container, &packets, limits)?,
+            None => decoded_times(packets.n_shown(), decode(&packets)?),
         };
         let times = PictureTimes {
             times_s,
@@ -274,18 +306,11 @@ impl PictureTimes {
     }
 }
 
-/// Returns the times of the decoded pictures, and whether too many packets were damaged.
-fn decode_times(
-    path: &Path,
-    container: Container,
-    packets: &Packets,
-    limits: &Limits,
-) -> Result<(Vec<Option<f64>>, bool), Error> {
-    let n_packets = packets.n_shown();
-    let pictures = Pictures::read(container, path, packets, limits)?;
+/// Returns the times of the decoded pictures, and whether too many of the packets were damaged.
+fn decoded_times(n_packets: usize, pictures: Pictures) -> (Vec<Option<f64>>, bool) {
     let min_decoded = n_packets.saturating_sub((n_packets / 50).max(2));
     let is_damaged = pictures.times_s.len() < min_decoded && !pictures.stderr_tail.is_empty();
-    Ok((pictures.times_s, is_damaged))
+    (pictures.times_s, is_damaged)
 }
 
 /// Returns whether each packet with a valid time decodes to exactly one picture with that time.

@@ -73,6 +73,17 @@ impl AllPackets {
         })
     }
 
+    /// Reads the packets from output of ffprobe.
+    pub(super) fn from_output(output: &[u8], limits: &Limits) -> Result<AllPackets, Error> {
+        let mut streams = Vec::new();
+        let mut take = |line: &str| add_packet(&mut streams, line, limits);
+        split_lines(output, &mut Vec::new(), &mut take)?;
+        Ok(AllPackets {
+            streams,
+            stderr_tail: String::new(),
+        })
+    }
+
     /// Returns the packets of a stream; an empty list if it has none.
     pub(super) fn of_stream(&self, stream_idx: u64) -> Packets {
         let packets = self.find(stream_idx).cloned();
@@ -181,18 +192,32 @@ impl Pictures {
         let (ffprobe, n_frames) = (installed(Tool::Ffprobe)?, packets.n_shown().max(1));
         let invocation = Invocation::new(ffprobe, args, limits, n_frames).with_input(path);
         let mut times_s = Vec::new();
-        let stderr_tail = read_lines(invocation, |line| {
-            let time = line.split(',').next().unwrap_or_default();
-            if time == "N/A" || time.parse::<f64>().is_ok() {
-                times_s.push(time.parse().ok());
-            }
-            limits.check_n_frames(times_s.len())
-        })?;
+        let stderr_tail = read_lines(invocation, |line| add_picture(&mut times_s, line, limits))?;
         Ok(Pictures {
             times_s,
             stderr_tail,
         })
     }
+
+    /// Reads the times from output of ffprobe.
+    pub(super) fn from_output(output: &[u8], limits: &Limits) -> Result<Pictures, Error> {
+        let mut times_s = Vec::new();
+        let mut take = |line: &str| add_picture(&mut times_s, line, limits);
+        split_lines(output, &mut Vec::new(), &mut take)?;
+        Ok(Pictures {
+            times_s,
+            stderr_tail: String::new(),
+        })
+    }
+}
+
+/// Parses one line about a decoded picture: its time, and side data. Side data may continue on further lines.
+fn add_picture(times_s: &mut Vec<Option<f64>>, line: &str, limits: &Limits) -> Result<(), Error> {
+    let time = line.split(',').next().unwrap_or_default();
+    if time == "N/A" || time.parse::<f64>().is_ok() {
+        times_s.push(time.parse().ok());
+    }
+    limits.check_n_frames(times_s.len())
 }
 
 /// Runs a tool and passes each line of its output to `take`. Returns its stderr.

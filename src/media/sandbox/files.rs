@@ -17,11 +17,12 @@ use landlock::{
     ABI, Access, AccessFs, AccessNet, BitFlags, PathBeneath, PathFd, Ruleset, RulesetAttr,
     RulesetCreated, RulesetCreatedAttr, Scope,
 };
+use serde::{Deserialize, Serialize};
 
 use super::{Layer, Policy};
 
 /// Files that a program needs to run: the program, its loader and its libraries.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(in crate::media) struct ProgramFiles {
     /// Files that may be executed: the program and its loader.
     pub(in crate::media) executables: Vec<PathBuf>,

@@ -6,10 +6,12 @@
     reason = "the kernel is asked by system calls that have no safe wrapper"
 )]
 
+use serde::{Deserialize, Serialize};
+
 use super::calls;
 
 /// One protection around a media child.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Layer {
     /// The child is killed when the thread that started it ends, and so when flockreel dies.
     Leash,
@@ -71,7 +73,7 @@ impl Layer {
 }
 
 /// A set of layers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Layers(u8);
 
 impl Layers {

@@ -19,7 +19,7 @@ use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::Command;
 
-use rustix::process::{Resource, Rlimit, Signal};
+use rustix::process::{Pid, Resource, Rlimit, Signal};
 use rustix::thread::{CapabilitySet, CapabilitySets};
 
 pub(super) use files::ProgramFiles;
@@ -66,11 +66,7 @@ pub(super) fn apply(
     let enter = move || {
         rustix::process::setsid()?;
         if layers.has(Layer::Leash) {
-            rustix::process::set_parent_process_death_signal(Some(Signal::KILL))?;
-        }
-        if rustix::process::getppid() != Some(parent) {
-            // The parent died before the death signal was set.
-            return Err(rustix::io::Errno::SRCH.into());
+            die_with(parent)?;
         }
         // The kernel requires this of every process that enters the layers below.
         rustix::thread::set_no_new_privs(true)?;
@@ -92,9 +88,36 @@ pub(super) fn apply(
     Ok(())
 }
 
-fn limits_of(policy: &Policy) -> [(Resource, u64); 5] {
+/// Makes the child that `command` will start the leader of a process group that dies with this process. Like
+/// [`apply`], it needs a starting thread that lives as long as the process.
+pub(super) fn leash(command: &mut Command) {
+    let parent = rustix::process::getpid();
+    let enter = move || {
+        rustix::process::setpgid(None, None)?;
+        Ok(die_with(parent)?)
+    };
+    // SAFETY: between fork and exec only async-signal-safe work is allowed. `enter` makes plain system calls:
+    // it does not allocate, lock or panic.
+    unsafe {
+        command.pre_exec(enter);
+    }
+}
+
+/// Has the kernel kill the calling process when the thread that started it ends. Async-signal-safe.
+fn die_with(parent: Pid) -> rustix::io::Result<()> {
+    rustix::process::set_parent_process_death_signal(Some(Signal::KILL))?;
+    if rustix::process::getppid() != Some(parent) {
+        // The parent died before the death signal was set.
+        return Err(rustix::io::Errno::SRCH);
+    }
+    Ok(())
+}
+
+fn limits_of(policy: &Policy) -> [(Resource, u64); 6] {
     [
         (Resource::As, policy.memory_bytes),
+        // An attempt at a job has a limit of its own, which its tools do not inherit.
+        (Resource::Data, policy.memory_bytes),
         (Resource::Cpu, policy.cpu_s),
         (Resource::Fsize, policy.file_bytes),
         (Resource::Nofile, OPEN_FILES),

@@ -17,13 +17,17 @@ impl Blobs {
         Ok(free_bytes)
     }
 
-    /// Returns whether a local folder can be created and removed, and whether the bucket answers, if there is
-    /// one; for the readiness check.
+    /// Returns whether a local folder can be created and removed; for the readiness check.
     pub async fn is_writable(&self) -> bool {
         let drafts = self.drafts.clone();
         let name = uuid::Uuid::now_v7().to_string();
         let made = tokio::task::spawn_blocking(move || drafts.draft(&name).is_ok());
-        made.await.unwrap_or(false) && self.backend.answers().await
+        made.await.unwrap_or(false)
+    }
+
+    /// Returns whether the bucket answers, if there is one; for the readiness check.
+    pub async fn is_reached(&self) -> bool {
+        self.backend.answers().await
     }
 }
 

@@ -111,17 +111,9 @@ impl Blobs {
         self.drafts.draft(name)
     }
 
-    /// Syncs and hashes all files of a draft. Returns them in the order of their names. Blocks the thread.
-    /// Fails if the draft has subfolders.
+    /// Syncs and hashes all files of a draft, as [`seal_folder`] does.
     pub fn seal(&self, draft: &Draft) -> io::Result<Vec<BlobFile>> {
-        let mut names: Vec<_> = fs::read_dir(draft.path())?
-            .map(|entry| Ok(entry?.file_name()))
-            .collect::<io::Result<_>>()?;
-        names.sort();
-        names
-            .iter()
-            .map(|name| seal_file(&draft.path().join(name)))
-            .collect()
+        seal_folder(draft.path())
     }
 
     /// Syncs and hashes one file of a draft. Blocks the thread.
@@ -305,7 +297,9 @@ impl Store {
 fn is_rejection(error: &Error) -> bool {
     matches!(
         error,
-        Error::Sql(sqlx::Error::Database(_)) | Error::AlreadyStored
+        Error::Sql(sqlx::Error::Database(_))
+            | Error::AlreadyStored
+            | Error::OwnerStorageFull { .. }
     ) || error.code() == Code::StorageFull
 }
 
@@ -325,6 +319,19 @@ pub(super) async fn insert(
             .await?;
     }
     Ok(())
+}
+
+/// Syncs and hashes all files of a folder that is to be stored. Returns them in the order of their names. Blocks the
+/// thread. Fails if the folder has subfolders.
+pub fn seal_folder(folder: &Path) -> io::Result<Vec<BlobFile>> {
+    let mut names: Vec<_> = fs::read_dir(folder)?
+        .map(|entry| Ok(entry?.file_name()))
+        .collect::<io::Result<_>>()?;
+    names.sort();
+    names
+        .iter()
+        .map(|name| seal_file(&folder.join(name)))
+        .collect()
 }
 
 fn seal_file(path: &Path) -> io::Result<BlobFile> {

@@ -1,20 +1,41 @@
 //! Claim: a worker takes the next queued job with a lease and a new fence. Owners take turns, so that one
-//! owner's many jobs do not delay another owner's job (docs/explanation/promises.md, "Fair queue").
+//! owner's many jobs do not delay another owner's job (docs/explanation/promises.md, "Fair queue"). The claim names
+//! the process of the worker, so that a rescue knows which jobs ran beside each other.
 
 use sqlx::types::Uuid;
 
 use super::Lease;
 use crate::store::{Error, Store, sql};
 
+/// The jobs that a worker runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lane {
+    /// All jobs.
+    All,
+    /// Small jobs only.
+    Short,
+}
+
 impl Store {
-    /// Claims the next job for a worker. Returns `None` if no job is ready. A job that depends on another one
-    /// is ready when that one is done.
-    ///
-    /// Order of the jobs: owners with fewer running jobs first, then higher priority, then owners whose last
-    /// job started longer ago, then older jobs.
+    /// Claims the next of all jobs for a process, as [`Store::claim_in`] does.
     pub async fn claim(
         &self,
-        worker: Uuid,
+        process: Uuid,
+        now_ms: i64,
+        lease_ms: i64,
+    ) -> Result<Option<Lease>, Error> {
+        self.claim_in(Lane::All, process, now_ms, lease_ms).await
+    }
+
+    /// Claims the next job of a lane for a process. Returns `None` if no job is ready. A job that depends on another
+    /// one is ready when that one is done.
+    ///
+    /// Order of the jobs: owners with fewer running jobs first, then higher priority, then owners whose last
+    /// job started longer ago, then small jobs, then older ones.
+    pub async fn claim_in(
+        &self,
+        lane: Lane,
+        process: Uuid,
         now_ms: i64,
         lease_ms: i64,
     ) -> Result<Option<Lease>, Error> {
@@ -26,18 +47,19 @@ impl Store {
                  from (select distinct owner from jobs where state = 'queued') q) \
              update jobs set state = 'running', fence = fence + 1, attempt = attempt + 1, \
              worker = $1, lease_until_ms = $3, started_ms = coalesce(started_ms, $2), \
-             stage = null, progress = 0 \
+             beside_crash = false, stage = null, progress = 0 \
              where state = 'queued' and id = ( \
                  select j.id from jobs j join turns t on t.owner = j.owner \
-                 where j.state = 'queued' and j.run_at_ms <= $2 \
+                 where j.state = 'queued' and j.run_at_ms <= $2 and (j.small or not $4) \
                  and (j.after_job is null \
                       or exists (select 1 from jobs a where a.id = j.after_job and a.state = 'done')) \
-                 order by t.n_running, j.priority desc, coalesce(t.last_ms, 0), j.id limit 1 for update of j skip locked) \
-             returning id as job_id, kind, input, result_id, attempt, fence",
+                 order by t.n_running, j.priority desc, coalesce(t.last_ms, 0), j.small desc, j.id limit 1 for update of j skip locked) \
+             returning id as job_id, kind, input, result_id, attempt, fence, own_crashes, transient_ends",
         )
-        .bind(worker)
+        .bind(process)
         .bind(now_ms)
         .bind(now_ms + lease_ms)
+        .bind(lane == Lane::Short)
         .fetch_optional(&self.writer)
         .await?;
         if let Some(lease) = &lease {

@@ -5,12 +5,14 @@ use sqlx::types::Uuid;
 
 use super::follow::{cancel_followers, fail_followers};
 use super::{JobState, Kind};
-use crate::store::owners::Account;
+use crate::store::owners::{Account, Owner};
 use crate::store::{Error, Store, Transaction, sql};
 use flockreel_core::ids::JobId;
 
+/// Named lock of transactions that add jobs.
+pub(in crate::store) const QUEUE_LOCK: &str = "queue";
 /// Name of the notification about new jobs.
-const QUEUED: &str = "flockreel_jobs";
+pub(super) const QUEUED: &str = "flockreel_jobs";
 
 /// A job to be queued.
 #[derive(Clone, Debug)]
@@ -29,6 +31,8 @@ pub struct NewJob {
     pub after_job: Option<JobId>,
     /// Jobs of higher priority run first. The usual value is 0.
     pub priority: i64,
+    /// Whether the job is expected to take little time.
+    pub is_small: bool,
     /// Maximum number of queued and running jobs of all owners, including this one.
     pub max_queued: i64,
 }
@@ -45,13 +49,13 @@ impl Store {
     /// differs.
     pub async fn enqueue(&self, job: &NewJob, now_ms: i64) -> Result<(), Error> {
         let mut transaction = self.begin().await?;
-        transaction.lock("queue").await?;
+        transaction.lock(QUEUE_LOCK).await?;
         if is_queued_already(&mut transaction, job).await? {
             return Ok(());
         }
         let added = sql::query(
             "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, \
-             created_ms, owner) select $1, $2, 'queued', $3, $4, $5, $6, $7, $7, $8 \
+             created_ms, owner, small) select $1, $2, 'queued', $3, $4, $5, $6, $7, $7, $8, $11 \
              where ($9 is null or $9 > (select count(*) from jobs \
              where owner = $8 and state in ('queued', 'running'))) \
              and $10 > (select count(*) from jobs where state in ('queued', 'running'))",
@@ -66,6 +70,7 @@ impl Store {
         .bind(&job.account.owner)
         .bind(job.account.quota)
         .bind(job.max_queued)
+        .bind(job.is_small)
         .execute(&mut transaction)
         .await?;
         if added == 0 {
@@ -120,15 +125,38 @@ async fn end_with_predecessor(
 
 /// Returns the limit that refused the job. If both limits are reached, returns that of the owner.
 async fn exceeded_limit(transaction: &mut Transaction, job: &NewJob) -> Result<Error, Error> {
-    let sql = "select count(*) from jobs where owner = $1 and state in ('queued', 'running')";
-    let count = sql::query_scalar(sql).bind(&job.account.owner);
-    let n_jobs: i64 = count.fetch_one(transaction).await?;
+    let n_jobs = n_under_way(transaction, &job.account.owner).await?;
     Ok(match job.account.quota {
         Some(quota) if quota <= n_jobs => Error::QuotaExceeded { quota },
         _ => Error::QueueFull {
             max_queued: job.max_queued,
         },
     })
+}
+
+/// Fails if more jobs are queued and running than the account and the queue allow.
+pub(super) async fn check_limits(
+    transaction: &mut Transaction,
+    account: &Account,
+    max_queued: i64,
+) -> Result<(), Error> {
+    if let Some(quota) = account.quota
+        && n_under_way(transaction, &account.owner).await? > quota
+    {
+        return Err(Error::QuotaExceeded { quota });
+    }
+    let sql = "select count(*) from jobs where state in ('queued', 'running')";
+    let n_jobs: i64 = sql::query_scalar(sql).fetch_one(transaction).await?;
+    if n_jobs > max_queued {
+        return Err(Error::QueueFull { max_queued });
+    }
+    Ok(())
+}
+
+async fn n_under_way(transaction: &mut Transaction, owner: &Owner) -> Result<i64, sqlx::Error> {
+    let sql = "select count(*) from jobs where owner = $1 and state in ('queued', 'running')";
+    let count = sql::query_scalar(sql).bind(owner);
+    count.fetch_one(transaction).await
 }
 
 async fn is_queued_already(transaction: &mut Transaction, job: &NewJob) -> Result<bool, Error> {
@@ -159,6 +187,7 @@ mod tests {
             result_id: Uuid::now_v7(),
             after_job,
             priority: 0,
+            is_small: false,
             max_queued: 100,
         }
     }

@@ -5,6 +5,7 @@ use sqlx::types::Uuid;
 
 use super::{Change, Lease};
 use crate::store::footage::{self, SampleFootage};
+use crate::store::owners::Owner;
 use crate::store::resources::ResourceKind;
 use crate::store::{BlobFile, Error, Store, Transaction, blobs, sql};
 
@@ -34,7 +35,8 @@ pub enum Source {
 
 impl Store {
     /// Links the result and ends the job if the fence is still valid. [`Change::Lost`] means that the caller
-    /// must discard its output. A pending cancel request is ignored.
+    /// must discard its output. A pending cancel request is ignored. Fails with [`Error::OwnerStorageFull`] if the
+    /// owner of the job has no space for the files.
     pub async fn finish(
         &self,
         lease: &Lease,
@@ -56,6 +58,9 @@ impl Store {
                 tracing::warn!(job.id = %lease.job_id, fence = lease.fence, "job result discarded: its lease was lost");
                 return Ok(Change::Lost);
             }
+            let owner = owner_of(&mut transaction, lease).await?;
+            self.require_owner_space(&mut transaction, &owner, outcome.size_bytes(), None)
+                .await?;
             blobs::insert(&mut transaction, &outcome.folder, &outcome.files).await?;
             insert(&mut transaction, lease, outcome, now_ms).await?;
             transaction.commit().await?;
@@ -71,6 +76,11 @@ impl Outcome {
     pub fn size_bytes(&self) -> i64 {
         self.files.iter().map(|file| file.size_bytes).sum()
     }
+}
+
+async fn owner_of(transaction: &mut Transaction, lease: &Lease) -> Result<Owner, sqlx::Error> {
+    let owner = sql::query_scalar("select owner from jobs where id = $1").bind(lease.job_id.0);
+    Ok(Owner(owner.fetch_one(transaction).await?))
 }
 
 /// Adds the row of the result. Its owner is the owner of the job.
@@ -93,7 +103,7 @@ async fn insert(
     };
     sql::query(format!(
         "insert into {} (id, job_id, fence, {source_column}, folder, params, summary, size_bytes, \
-         created_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, \
+         created_ms, used_ms, owner) values ($1, $2, $3, $4, $5, $6, $7, $8, $9, $9, \
          (select owner from jobs where id = $2))",
         kind.plural()
     ))

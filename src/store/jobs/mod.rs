@@ -3,11 +3,12 @@
 //!
 //! ```text
 //! enqueue -> queued --claim--> running --finish--> done
-//!              ^  |               |  \---fail----> failed      <- rescue, after two crashes
-//!              |  '----cancel--.  |  '---stop----> cancelled   <- rescue, if cancel was requested
-//!              |               v  |
-//!              |           cancelled
-//!              '-- retry, release, rescue
+//!            ^ ^  |               |  \---fail----> failed      <- rescue, after three crashes
+//!            | |  '----cancel--.  |  '---stop----> cancelled   <- rescue, if cancel was requested
+//!            | |               v  |                   |
+//!            | |           cancelled                  |
+//!            | '-- requeue, release, rescue           |
+//!            '-- retry, by a user --------------------'
 //! ```
 //! The queue never deletes rows, because users want to see the history of their jobs.
 
@@ -21,6 +22,7 @@ mod follow;
 pub mod heartbeat;
 pub mod read;
 pub mod release;
+pub mod requeue;
 pub mod rescue;
 pub mod retry;
 #[cfg(test)]
@@ -48,15 +50,15 @@ pub enum Kind {
 /// State of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JobState {
-    /// Waits for a worker. Entered by enqueue, retry, release, rescue; left by claim, cancel.
+    /// Waits for a worker. Entered by enqueue, requeue, release, rescue, retry; left by claim, cancel.
     Queued,
-    /// A worker holds its lease. Entered by claim; left by finish, fail, retry, release, stop, rescue.
+    /// A worker holds its lease. Entered by claim; left by finish, fail, requeue, release, stop, rescue.
     Running,
     /// Its result is linked. Entered by finish; final.
     Done,
-    /// It has an error code. Entered by fail and by rescue (quarantine); final.
+    /// It has an error code. Entered by fail and by rescue (quarantine); final unless a user retries it.
     Failed,
-    /// A user cancelled it. Entered by cancel, stop and rescue; final.
+    /// A user cancelled it. Entered by cancel, stop and rescue; final unless a user retries it.
     Cancelled,
 }
 
@@ -77,6 +79,10 @@ pub struct Lease {
     pub attempt: i64,
     /// Number of the claim. Only the latest claim of a job can change it.
     pub fence: i64,
+    /// Number of attempts whose own process crashed.
+    pub own_crashes: i64,
+    /// Number of attempts that ended for a transient reason.
+    pub transient_ends: i64,
 }
 
 /// Whether a transition that requires a valid lease took place.

@@ -2,6 +2,7 @@
 
 use sqlx::types::Uuid;
 
+use super::retry::Refusal;
 use super::{JobState, Kind};
 use crate::store::owners::OwnerFilter;
 use crate::store::{Error, Store};
@@ -11,6 +12,7 @@ use flockreel_core::ids::JobId;
 /// Statement that selects the jobs of all owners as [`JobRow`]s. The table has the alias `r`.
 pub(super) const SELECT: &str = "select id, kind, state, result_id, cancel_requested, attempt, stage, \
     progress, code, detail, created_ms, started_ms, finished_ms, refused_jpeg is not null as has_picture, \
+    (select b.state from jobs b where b.id = r.after_job) as state_before, \
     case kind when 'sample' then null when 'analysis' then json_extract(input, '$.footage_id') \
     else json_extract(input, '$.library_id') end as subject from jobs r";
 
@@ -39,6 +41,7 @@ pub struct JobRow {
     pub progress: f64,
     code: Option<String>,
     detail: Option<String>,
+    state_before: Option<String>,
     /// Whether a picture shows the reason of the failure.
     pub has_picture: bool,
     /// Time at which the job was queued, milliseconds since 1970.
@@ -71,6 +74,16 @@ impl JobRow {
             code: Code::from_name(code).unwrap_or(Code::Internal),
             detail: self.detail.clone().unwrap_or_default(),
         })
+    }
+}
+
+impl JobRow {
+    /// Returns whether a user may have the job tried again.
+    pub fn is_retriable(&self) -> bool {
+        let code = self.code.as_deref().and_then(Code::from_name);
+        let before = self.state_before.clone();
+        let before = before.and_then(|state| JobState::try_from(state).ok());
+        Refusal::of(self.state, code, before).is_none()
     }
 }
 

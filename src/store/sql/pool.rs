@@ -266,8 +266,6 @@ impl<'a> From<&'a mut Transaction> for On<'a> {
 
 #[cfg(test)]
 mod tests {
-    use std::borrow::Cow;
-
     use super::*;
     use flockreel_core::code::Code;
 
@@ -293,69 +291,5 @@ mod tests {
         }
         let count = query_scalar("select count(*) from films");
         assert_eq!(count.fetch_one::<i64>(&writer).await.unwrap(), 3);
-    }
-
-    /// A finished analysis with its library, a finished flock job that depends on it, and a queued one.
-    const ROWS: &str = "
-        insert into footage (id, folder, sha256, background_sha256, name, size_bytes, width, height, fps,
-            n_frames_hint, sample, created_ms) values (x'00000000000000000000000000000001', 'footage/1',
-            zeroblob(32), x'', 'film', 0, 1, 1, 1.0, 1, 0, 0);
-        insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, created_ms,
-            finished_ms, owner) values
-            (x'00000000000000000000000000000002', 'analysis', 'done', '{}',
-                x'00000000000000000000000000000003', null, 0, 0, 5, 6, 'ann'),
-            (x'00000000000000000000000000000004', 'flock', 'done', '{}',
-                x'00000000000000000000000000000005', x'00000000000000000000000000000002', 0, 0, 7, 8, 'ann'),
-            (x'00000000000000000000000000000006', 'flock', 'queued', '{}',
-                x'00000000000000000000000000000007', x'00000000000000000000000000000002', 0, 0, 9, null, 'ann');
-        insert into libraries (id, job_id, fence, folder, footage_id, params, summary, size_bytes, created_ms)
-            values (x'00000000000000000000000000000003', x'00000000000000000000000000000002', 0, 'libraries/3',
-            x'00000000000000000000000000000001', '{}', '{}', 0, 6);
-        insert into flocks (id, job_id, fence, folder, library_id, params, summary, size_bytes, created_ms)
-            values (x'00000000000000000000000000000005', x'00000000000000000000000000000004', 0, 'flocks/5',
-            x'00000000000000000000000000000003', '{}', '{}', 0, 8);";
-
-    #[tokio::test]
-    async fn migration_keeps_jobs_of_older_versions_and_their_references() {
-        let data = tempfile::tempdir().unwrap();
-        let file = data.path().join("rows.db");
-        let older = SQLITE_MIGRATIONS
-            .iter()
-            .filter(|one| one.version < 12)
-            .cloned();
-        let older = Migrator {
-            migrations: Cow::Owned(older.collect()),
-            ..Migrator::DEFAULT
-        };
-        let pool = SqlitePool::connect_with(options(&file)).await.unwrap();
-        older.run(&pool).await.unwrap();
-        sqlx::raw_sql(ROWS).execute(&pool).await.unwrap();
-        pool.close().await;
-
-        let [pool, _] = Pool::open_sqlite(&file, true).await.unwrap();
-        let sql = "select kind, state, owner, created_ms, after_job is null from jobs order by id";
-        let jobs: Vec<(String, String, String, i64, bool)> =
-            query(sql).fetch_all(&pool).await.unwrap();
-        let row = |kind: &str, state: &str, ms, is_first| {
-            (
-                kind.to_owned(),
-                state.to_owned(),
-                "ann".to_owned(),
-                ms,
-                is_first,
-            )
-        };
-        assert_eq!(
-            jobs,
-            [
-                row("analysis", "done", 5, true),
-                row("flock", "done", 7, false),
-                row("flock", "queued", 9, false)
-            ]
-        );
-        let broken = query_scalar("select count(*) from pragma_foreign_key_check");
-        assert_eq!(broken.fetch_one::<i64>(&pool).await.unwrap(), 0);
-        let removed = query("delete from jobs where kind = 'analysis'");
-        removed.execute(&pool).await.unwrap_err();
     }
 }

@@ -14,6 +14,8 @@ pub struct Census {
     pub oldest_queued_ms: Option<i64>,
     /// Size of the files by type of data, bytes. `uploads` counts unfinished uploads only.
     pub stored_bytes: Vec<(&'static str, i64)>,
+    /// Announced size of all open uploads and of all bodies that are being received, bytes.
+    pub announced_bytes: i64,
 }
 
 impl Store {
@@ -39,7 +41,10 @@ impl Store {
             let n_bytes = sql::query_scalar(sql).fetch_one(&self.reader).await?;
             stored_bytes.push((name, n_bytes));
         }
+        let sql = "select cast(coalesce(sum(size_bytes), 0) as bigint) from uploads where footage_id is null";
+        let of_uploads: i64 = sql::query_scalar(sql).fetch_one(&self.reader).await?;
         Ok(Census {
+            announced_bytes: of_uploads + self.incoming_bytes().cast_signed(),
             jobs,
             oldest_queued_ms,
             stored_bytes,

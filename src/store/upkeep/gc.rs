@@ -1,9 +1,10 @@
-//! Removal of data that nothing refers to, counted first, for `flockreel gc`
-//! (docs/explanation/promises.md, "No orphans"). Unfinished work of running processes is kept.
+//! Removal of data that nothing refers to and of data that is too old, counted first, for `flockreel gc`
+//! (docs/explanation/promises.md, "No orphans" and "Limited space"). Unfinished work of running processes is kept.
 
 use std::fs;
 use std::time::SystemTime;
 
+use crate::config::Retention;
 use crate::store::idempotency::ANSWER_LIFETIME_MS;
 use crate::store::{Error, Store, sql};
 
@@ -18,13 +19,22 @@ pub struct Waste {
     pub n_uploads: usize,
     /// Number of expired sessions and idempotency keys.
     pub n_rows: usize,
+    /// Number of resources that nobody used for the time of the settings.
+    pub n_unused: usize,
+    /// Number of jobs that failed or were cancelled before the time of the settings.
+    pub n_jobs: usize,
     /// Total size of these files, bytes.
     pub n_bytes: u64,
 }
 
 impl Store {
     /// Counts the removable data. Changes nothing.
-    pub async fn waste(&self, now: SystemTime, now_ms: i64) -> Result<Waste, Error> {
+    pub async fn waste(
+        &self,
+        retention: Retention,
+        now: SystemTime,
+        now_ms: i64,
+    ) -> Result<Waste, Error> {
         let mut waste = Waste::default();
         (waste.n_drafts, waste.n_bytes) = self.blobs.drafts().n_abandoned()?;
         for folder in self.old_folders_without_row(now).await? {
@@ -55,12 +65,22 @@ impl Store {
                 .await?;
             waste.n_rows += usize::try_from(count).unwrap_or(0);
         }
+        let retirable = self.retirable(retention, now_ms).await?;
+        waste.n_unused = usize::try_from(retirable.total().n).unwrap_or(0);
+        waste.n_jobs = usize::try_from(retirable.n_jobs).unwrap_or(0);
+        waste.n_bytes += retirable.total().n_bytes.unsigned_abs();
         Ok(waste)
     }
 
     /// Removes the data and returns the amounts counted before.
-    pub async fn collect_waste(&self, now: SystemTime, now_ms: i64) -> Result<Waste, Error> {
-        let waste = self.waste(now, now_ms).await?;
+    pub async fn collect_waste(
+        &self,
+        retention: Retention,
+        now: SystemTime,
+        now_ms: i64,
+    ) -> Result<Waste, Error> {
+        let waste = self.waste(retention, now, now_ms).await?;
+        self.retire(retention, now_ms).await?;
         self.sweep(now).await?;
         if self.serves() {
             self.sweep_upload_files().await?;
@@ -91,6 +111,12 @@ mod tests {
     use crate::store::upkeep::sweep::GRACE;
     use crate::store::{blobs, fresh};
 
+    /// Settings that delete nothing because of its age.
+    const KEEP: Retention = Retention {
+        keep_days: 0,
+        keep_jobs_days: 0,
+    };
+
     #[tokio::test]
     async fn unreferenced_data_is_counted_and_removed() {
         let data = tempfile::tempdir().unwrap();
@@ -100,16 +126,16 @@ mod tests {
             fs::write(data.path().join(folder).join("video"), b"12345").unwrap();
         }
         let later = SystemTime::now() + 2 * GRACE;
-        let now = store.waste(SystemTime::now(), 0).await.unwrap();
+        let now = store.waste(KEEP, SystemTime::now(), 0).await.unwrap();
         assert_eq!(
             (now.n_drafts, now.n_folders),
             (1, 0),
             "a young folder may get its row later"
         );
-        let found = store.waste(later, 0).await.unwrap();
+        let found = store.waste(KEEP, later, 0).await.unwrap();
         assert_eq!((found.n_drafts, found.n_folders, found.n_bytes), (1, 1, 10));
-        assert_eq!(store.collect_waste(later, 0).await.unwrap(), found);
-        assert_eq!(store.waste(later, 0).await.unwrap(), Waste::default());
+        assert_eq!(store.collect_waste(KEEP, later, 0).await.unwrap(), found);
+        assert_eq!(store.waste(KEEP, later, 0).await.unwrap(), Waste::default());
     }
 
     #[tokio::test]
@@ -126,7 +152,7 @@ mod tests {
             .unwrap();
         transaction.commit().await.unwrap();
         let later = SystemTime::now() + 2 * GRACE;
-        let removed = store.collect_waste(later, 0).await.unwrap();
+        let removed = store.collect_waste(KEEP, later, 0).await.unwrap();
         assert_eq!(removed, Waste::default());
         assert_eq!(store.blobs().folders().await.unwrap().len(), 1);
     }
@@ -139,7 +165,7 @@ mod tests {
         let beside = Store::open_beside(data.path()).await.unwrap();
         let later = SystemTime::now() + GRACE + Duration::from_secs(1);
         assert_eq!(
-            beside.collect_waste(later, 0).await.unwrap(),
+            beside.collect_waste(KEEP, later, 0).await.unwrap(),
             Waste::default()
         );
         assert!(draft.path().is_dir());

@@ -16,6 +16,13 @@ export class Problem extends Error {
   }
 }
 
+/** Key of local storage that records a session, because the page cannot see its cookie. */
+const SIGNED_IN = "flockreel-signed-in";
+/** Whether the person has signed in, and so the service asks for a token. */
+export const isSignedIn = () => localStorage.getItem(SIGNED_IN) !== null;
+export const rememberSession = () => localStorage.setItem(SIGNED_IN, "yes");
+export const forgetSession = () => localStorage.removeItem(SIGNED_IN);
+
 export const unreachable = () => new Problem({ title: say("problem.unreachable"), detail: say("problem.unreachable.detail") });
 
 /** @param {string} text @param {number} status */

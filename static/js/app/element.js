@@ -39,5 +39,12 @@ export function svg(tag, attributes = {}, ...children) {
   return node;
 }
 
+/** Ends the download of a video. Out of the page, it would go on and hold a connection. @param {HTMLVideoElement} video */
+export function releaseVideo(video) {
+  video.pause();
+  video.removeAttribute("src");
+  video.load();
+}
+
 /** @param {string} id @returns {any} */
 export const byId = (id) => document.getElementById(id);

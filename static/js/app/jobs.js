@@ -1,18 +1,20 @@
 // All jobs of the person, kept up to date by the event stream, and by polling while the stream is down.
 // @ts-check
-import { get, Problem, remove } from "./api.js";
+import { get, post, Problem, remove } from "./api.js";
 import { signal } from "./store.js";
 
 const POLL_MS = 1000;
 /** Time after which a service that did not answer is asked again, ms. */
 const RETRY_MS = 3000;
-/** Number of jobs that the page keeps. */
+/** Number of jobs that the page keeps, besides all that are under way. */
 const KEPT = 100;
 
 /** The newest jobs, newest first. @type {import("./store.js").Signal<any[]>} */
 export const jobs = signal(/** @type {any[]} */ ([]));
 /** Whether the service has answered at least once. */
 export const ready = signal(false);
+/** Waits until the jobs are known. @param {AbortSignal} life @returns {Promise<void>} */
+export const whenReady = (life) => new Promise((resolve) => ready.watch((isReady) => { if (isReady) resolve(); }, life));
 /** Uploads of this tab, newest first. @type {import("./store.js").Signal<import("./upload.js").Upload[]>} */
 export const uploads = signal(/** @type {any[]} */ ([]));
 let live = false;
@@ -47,7 +49,25 @@ function listen() {
   } else import("./job-events.js").then(({ openEvents }) => openEvents(hear));
 }
 
-const reload = async () => jobs.set((await get(`/v1/jobs?limit=${KEPT}`)).items);
+/** Time at which a job was last heard of, ms. An answer to an earlier request knows less. @type {Map<string, number>} */
+const heard = new Map();
+/** @param {any} job @param {number} since_ms */
+const isHeard = ({ id }, since_ms) => (heard.get(id) ?? -1) >= since_ms;
+
+/** @param {any[]} all */
+function keep(all) {
+  // Ids grow with the time at which they were made.
+  const sorted = all.sort((a, b) => (a.id < b.id ? 1 : -1));
+  jobs.set(sorted.filter((job, k) => k < KEPT || isUnderWay(job)));
+}
+
+async function reload() {
+  const begun_ms = performance.now();
+  const { items } = await get(`/v1/jobs?limit=${KEPT}`);
+  const oldest = items.length < KEPT ? "" : items[KEPT - 1].id;
+  const others = jobs.value.filter((job) => isHeard(job, begun_ms) || job.id < oldest);
+  keep([...items.filter((/** @type {any} */ item) => !isHeard(item, begun_ms)), ...others]);
+}
 
 /** @param {{job?: any, live: boolean}} message */
 function hear(message) {
@@ -60,15 +80,16 @@ function hear(message) {
 
 /** @param {any} job with only its id if it was deleted */
 function merge(job) {
+  heard.set(job.id, performance.now());
   const others = jobs.value.filter((other) => other.id !== job.id);
-  if (!job.state) return jobs.set(others);
-  const all = [job, ...others].sort((a, b) => (a.created_at < b.created_at ? 1 : -1));
-  jobs.set(all.slice(0, KEPT));
+  keep(job.state ? [job, ...others] : others);
 }
 
 /** Adds a job that this page has just started, before the stream tells of it. @param {string} id */
 export async function expect(id) {
-  merge(await get(`/v1/jobs/${id}`));
+  const begun_ms = performance.now();
+  const job = await get(`/v1/jobs/${id}`);
+  if (!isHeard(job, begun_ms)) merge(job);
 }
 
 /**
@@ -77,8 +98,11 @@ export async function expect(id) {
  * @returns {Promise<any>} the job when it is done; throws a Problem if it failed, an AbortError if it was cancelled or deleted
  */
 export function ended(id, life, onChange = () => {}) {
+  const waiting = new AbortController();
+  const { signal } = waiting;
   return new Promise((resolve, reject) => {
-    life.addEventListener("abort", () => reject(new DOMException("left", "AbortError")));
+    life.throwIfAborted();
+    life.addEventListener("abort", () => reject(life.reason), { signal });
     let seen = false;
     jobs.watch((all) => {
       const job = all.find((one) => one.id === id);
@@ -89,13 +113,19 @@ export function ended(id, life, onChange = () => {}) {
       if (job.state === "failed") reject(new Problem(job.error ?? {}));
       if (job.state === "cancelled") reject(new DOMException("cancelled", "AbortError"));
       return undefined;
-    }, life);
+    }, AbortSignal.any([life, signal]));
     if (!seen) expect(id).catch(reject);
-  });
+  }).finally(() => waiting.abort());
 }
+
+/** Returns the number of jobs that come before a job that waits, as far as this person sees them. @param {any} job */
+export const aheadOf = (job) => jobs.value.filter((other) => isUnderWay(other) && other.id < job.id).length;
 
 /** @param {string} id */
 export const cancel = (id) => remove(`/v1/jobs/${id}`);
+
+/** Starts a failed or cancelled job again. @param {string} id */
+export const retry = async (id) => merge(await post(`/v1/jobs/${id}/retry`));
 
 /** Returns the id of the result of a job. @param {any} job @returns {string} */
 export const resultOf = (job) => job.links.result.split("/").at(-1);

@@ -32,27 +32,33 @@ export function filmName(one) {
   return (one?.name || "").replace(/\.[a-z0-9]{2,5}$/i, "").replaceAll("_", " ").trim() || say("film.unnamed");
 }
 
-/** Lists under way, by kind. @type {Map<string, Promise<{next: string | null}>>} */
+/** Lists of the last moment, by kind. @type {Map<string, Promise<{items: any[], next: string | null}>>} */
 const listing = new Map();
 
 /**
  * Returns a thing that may be deleted: the list of its kind tells whether it exists, so that nothing missing
- * is asked for. @param {"footage" | "libraries"} kind @param {string} id @returns {Promise<any>} null if it is gone
+ * is asked for. Fails if the service does not answer.
+ * @param {"footage" | "libraries"} kind @param {string} id @returns {Promise<any>} null if it is gone
  */
 async function existing(kind, id) {
   const path = `/v1/${kind}/${id}`;
   if (!known.has(path)) {
     const asked = listing.get(kind) ?? list(`/v1/${kind}?limit=100`).then((page) => { remember(kind, page.items); return page; });
     listing.set(kind, asked);
-    const { next } = await asked.finally(() => setTimeout(() => listing.delete(kind), 1000));
-    if (!known.has(path) && !next) return null;
+    const { items: [newest], next } = await asked.finally(() => setTimeout(() => listing.delete(kind), 1000));
+    // Ids grow with time: the list does not know what is younger.
+    const isYounger = !newest || id > newest.id;
+    if (!known.has(path) && !next && !isYounger) return null;
   }
-  return thing(kind, id).catch(() => null);
+  return thing(kind, id).catch((problem) => {
+    if (problem.status === 404) return null;
+    throw problem;
+  });
 }
 
 /**
  * Returns the film that a job works on: its name, the address of a picture if there is one, and
- * whether it was deleted or never made.
+ * whether it was deleted or never made. Fails if the service does not answer.
  * @param {any} job @returns {Promise<{name: string, poster: string, isGone: boolean}>}
  */
 export async function subjectOf(job) {
@@ -61,10 +67,10 @@ export async function subjectOf(job) {
   const maker = jobs.value.find((other) => other.id !== job.id && resultOf(other) === job.subject.id);
   if (maker && maker.state !== "done") return { name: (await subjectOf(maker)).name, poster: "", isGone: true };
   const kind = job.subject.kind === "footage" ? "footage" : "libraries";
-  const one = await existing(kind, job.subject.id).catch(() => null);
-  const libraryId = kind === "libraries" ? job.subject.id : job.kind === "analysis" && job.state === "done" && await existing("libraries", resultOf(job)).then((library) => library?.id, () => "");
+  const one = await existing(kind, job.subject.id);
+  const libraryId = kind === "libraries" ? job.subject.id : job.kind === "analysis" && job.state === "done" && (await existing("libraries", resultOf(job)))?.id;
   return { name: one ? filmName(one) : say("film.deleted"), poster: one && libraryId ? `/v1/libraries/${libraryId}/poster.jpg` : "", isGone: !one };
 }
 
-/** Returns the library of a flock, null if it was deleted. @param {any} flock */
-export const libraryOf = (flock) => existing("libraries", flock.library_id).catch(() => null);
+/** Returns the library of a flock, null if it was deleted. Fails if the service does not answer. @param {any} flock */
+export const libraryOf = (flock) => existing("libraries", flock.library_id);

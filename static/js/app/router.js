@@ -41,7 +41,7 @@ export function startRouter() {
     // A link within the place moves the focus only: following it would build the place again.
     if (link instanceof HTMLAnchorElement && link.hash && link.pathname === location.pathname && link.origin === location.origin) {
       event.preventDefault();
-      byId(link.hash.slice(1)).focus();
+      byId(link.hash.slice(1))?.focus();
       return;
     }
     if (!(link instanceof HTMLAnchorElement) || !isInside(link, event)) return;
@@ -75,13 +75,14 @@ export const replaceAddress = (address) => history.replaceState(history.state, "
 /** Sets the title of the document. @param {string} [title] */
 export const setTitle = (title) => { document.title = title ? `${title} · flockreel` : "flockreel"; };
 
-/** Loads a style sheet once. @param {string} name */
-export function styled(name) {
-  const href = `/static/css/${name}.css`;
-  if (document.querySelector(`link[href="${href}"]`)) return undefined;
-  const link = Object.assign(document.createElement("link"), { rel: "stylesheet", href });
-  document.head.append(link);
-  return new Promise((resolve) => { link.onload = link.onerror = resolve; });
+/** Style sheets that were asked for, by address. @type {Map<string, Promise<unknown>>} */
+const styles = new Map();
+
+/** Loads a style sheet once and waits for it. @param {string} href */
+export function styled(href) {
+  const loading = styles.get(href) ?? new Promise((resolve) => document.head.append(element("link", { rel: "stylesheet", href, onload: resolve, onerror: resolve })));
+  styles.set(href, loading);
+  return loading;
 }
 
 /** @returns {Promise<void>} */
@@ -96,12 +97,12 @@ async function show({ focus = false, scroll = 0 }) {
     else link.removeAttribute("aria-current");
   }
   const root = byId("place");
-  const id = decodeURIComponent(route?.pattern.exec(location.pathname)?.[1] ?? "");
   setTitle();
   try {
+    const id = decodeURIComponent(route?.pattern.exec(location.pathname)?.[1] ?? "");
     const name = route?.place ?? "missing";
     /** @type {[Place, ...unknown[]]} */
-    const [place] = await Promise.all([import(`../places/${name}.js`), ...(PLAIN.includes(name) ? [] : STYLES.map(styled))]);
+    const [place] = await Promise.all([import(`../places/${name}.js`), ...(PLAIN.includes(name) ? [] : STYLES.map((sheet) => styled(`/static/css/${sheet}.css`)))]);
     if (life.aborted) return;
     root.replaceChildren();
     root.className = `place place-${name}`;
@@ -113,10 +114,19 @@ async function show({ focus = false, scroll = 0 }) {
     if (scroll) scrollTo(0, scroll);
   } catch (problem) {
     if (life.aborted || /** @type {any} */ (problem).name === "AbortError") return;
-    if (!root.querySelector("h1") && /** @type {any} */ (problem).status === 404) return (await import("../places/missing.js")).show(root);
-    setTitle(say("problem.title"));
-    // Without a connection, the modules of a place cannot be loaded.
-    showProblem(root, problem instanceof TypeError && !navigator.onLine ? unreachable() : problem);
-    root.prepend(element("h1", { tabIndex: -1 }, say("problem.title")));
+    await fail(root, problem);
+    if (focus) root.querySelector("h1")?.focus({ preventScroll: true });
   }
+}
+
+/** Shows why a place cannot be shown. @param {HTMLElement} root @param {any} problem */
+async function fail(root, problem) {
+  // An address such as /films/%ff names nothing.
+  const isMissing = problem.status === 404 || problem instanceof URIError;
+  const missing = isMissing && !root.querySelector("h1") && await import("../places/missing.js").catch(() => null);
+  if (missing) return missing.show(root);
+  setTitle(say("problem.title"));
+  // Without a connection, the modules of a place cannot be loaded.
+  showProblem(root, problem instanceof TypeError && !navigator.onLine ? unreachable() : problem);
+  root.prepend(element("h1", { tabIndex: -1 }, say("problem.title")));
 }

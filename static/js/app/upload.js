@@ -10,20 +10,21 @@ const RESUMED_BYTES = 4e6;
 const PIECE_BYTES = 8e6;
 
 /**
- * @typedef {{id: number, name: string, address: string, sent: number, total: number, state: "sending" | "checking" | "failed" | "paused" | "done", problem: any, cancel: () => void}} Upload
+ * @typedef {{id: number, name: string, address: string, sent: number, total: number, state: "sending" | "checking" | "failed" | "paused", problem: any, cancel: () => void}} Upload
  *   address: the film itself, in this tab
  */
 
 /** Addresses of films that this tab has sent, by the id of their footage: they play before they are measured. @type {Map<string, string>} */
 export const sent = new Map();
 let n_uploads = 0;
+const newId = () => n_uploads += 1;
 
 /** Shows uploads that a reload interrupted: the browser forgets the file, so a person must choose it again. */
 export function tellInterrupted() {
   for (const [key, text] of Object.entries({ ...localStorage })) {
     if (!key.startsWith("tus::")) continue;
     /** @type {Upload} */
-    const upload = { id: n_uploads += 1, name: JSON.parse(text).metadata?.filename ?? "", address: "", sent: 0, total: 0, state: "paused", problem: null,
+    const upload = { id: newId(), name: JSON.parse(text).metadata?.filename ?? "", address: "", sent: 0, total: 0, state: "paused", problem: null,
       cancel: () => { localStorage.removeItem(key); forget(upload); } };
     uploads.set([...uploads.value, upload]);
   }
@@ -43,18 +44,22 @@ const forget = (upload) => uploads.set(uploads.value.filter((other) => other !==
  * @param {File} file @returns {Promise<any>} the footage; an AbortError if the person cancelled
  */
 export async function send(file) {
+  const stop = new AbortController();
   /** @type {Upload} */
-  const upload = { id: n_uploads += 1, name: file.name, address: URL.createObjectURL(file), sent: 0, total: file.size, state: "sending", problem: null, cancel: () => {} };
+  const upload = { id: newId(), name: file.name, address: URL.createObjectURL(file), sent: 0, total: file.size, state: "sending", problem: null, cancel: () => stop.abort() };
   uploads.set([upload, ...uploads.value.filter((other) => other.state !== "paused" || other.name !== file.name)]);
+  const discard = () => { forget(upload); URL.revokeObjectURL(upload.address); };
   try {
     const tus = file.size > RESUMED_BYTES ? await import("/vendor/tus.js").catch(() => null) : null;
-    const footage = await (tus ? sendInPieces(tus, file, upload) : sendAtOnce(file, upload));
+    stop.signal.throwIfAborted();
+    const footage = await (tus ? sendInPieces(tus, file, upload, stop.signal) : sendAtOnce(file, upload, stop.signal));
     forget(upload);
+    URL.revokeObjectURL(sent.get(footage.id) ?? "");
     sent.set(footage.id, upload.address);
     return footage;
   } catch (problem) {
-    if (/** @type {any} */ (problem).name === "AbortError") forget(upload);
-    else update(upload, { state: "failed", problem, cancel: () => forget(upload) });
+    if (/** @type {any} */ (problem).name === "AbortError") discard();
+    else update(upload, { state: "failed", problem, cancel: discard });
     throw problem;
   }
 }
@@ -62,27 +67,27 @@ export async function send(file) {
 /** @param {Upload} upload @param {number} sent @param {number} total */
 const report = (upload, sent, total) => update(upload, { sent, total, state: sent < total ? "sending" : "checking" });
 
-/** @param {File} file @param {Upload} upload */
-function sendAtOnce(file, upload) {
+/** @param {File} file @param {Upload} upload @param {AbortSignal} stop */
+function sendAtOnce(file, upload, stop) {
   return new Promise((resolve, reject) => {
     // fetch reports no progress of an upload.
     const request = new XMLHttpRequest();
-    upload.cancel = () => request.abort();
+    stop.addEventListener("abort", () => request.abort());
     request.upload.addEventListener("progress", (event) => report(upload, event.loaded, event.total || file.size));
     request.addEventListener("load", () => {
       if (request.status >= 200 && request.status < 300) resolve(JSON.parse(request.responseText));
       else reject(problemFrom(request.responseText, request.status));
     });
     request.addEventListener("error", () => reject(unreachable()));
-    request.addEventListener("abort", () => reject(new DOMException("cancelled", "AbortError")));
+    request.addEventListener("abort", () => reject(stop.reason));
     request.open("POST", `/v1/footage?name=${encodeURIComponent(file.name)}`);
     request.setRequestHeader("Content-Type", file.type || "application/octet-stream");
     request.send(file);
   });
 }
 
-/** @param {any} tus @param {File} file @param {Upload} upload */
-function sendInPieces(tus, file, upload) {
+/** @param {any} tus @param {File} file @param {Upload} upload @param {AbortSignal} stop */
+function sendInPieces(tus, file, upload, stop) {
   return new Promise((resolve, reject) => {
     let address = "";
     const sending = new tus.Upload(file, {
@@ -100,10 +105,15 @@ function sendInPieces(tus, file, upload) {
       },
       onSuccess: () => get(address).then(resolve, reject),
     });
-    upload.cancel = () => { sending.abort(true); reject(new DOMException("cancelled", "AbortError")); };
+    stop.addEventListener("abort", () => {
+      reject(stop.reason);
+      // The service forgets what was sent; if it cannot be reached, it does so by itself after a while.
+      sending.abort(true).catch(() => {});
+    });
     sending.findPreviousUploads().then((/** @type {any[]} */ former) => {
+      if (stop.aborted) return;
       if (former[0]) sending.resumeFromPreviousUpload(former[0]);
       sending.start();
-    });
+    }).catch(reject);
   });
 }

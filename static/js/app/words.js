@@ -47,8 +47,8 @@ export function say(key, values = {}) {
   });
 }
 
-/** Returns the words of a key, or `other` if there are none. @param {string} key @param {string} other */
-export const sayOr = (key, other) => (table[key] ? say(key) : other);
+/** Returns the sentence of a key, or `other` if there is none. @param {string} key @param {string} other @param {Values} [values] */
+export const sayOr = (key, other, values) => (table[key] ? say(key, values) : other);
 
 /** @param {number} value */
 export const count = (value) => number.format(value);

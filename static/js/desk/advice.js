@@ -57,10 +57,10 @@ function adviceCard(desk, { code, sentence }, { pictures, shoot, acts }) {
 function sentenceOf({ library, facts, start_s, end_s }, code, sentence) {
   const stats = facts.value?.stats ?? {};
   const values = { seen: percent(library.detected_share), playable: percent(library.component_share), playable_s: library.component_share * (end_s - start_s), first_s: stats.first_foreign_s ?? 0, n: stats.n_foreign_frames ?? 0, times: stats.kappa_used ?? 0 };
-  return sayOr(`desk.advice.${code}`, "") ? say(`desk.advice.${code}`, values) : sentence.charAt(0).toUpperCase() + sentence.slice(1).replace(/([^.])$/, "$1.");
+  return sayOr(`desk.advice.${code}`, sentence.charAt(0).toUpperCase() + sentence.slice(1).replace(/([^.])$/, "$1."), values);
 }
 
-/** The view, with the button that says the other one. @param {import("./instrument.js").Instrument} desk @param {any} shoot @param {Acts} acts */
+/** The view that was found, with a button that chooses the other view. @param {import("./instrument.js").Instrument} desk @param {any} shoot @param {Acts} acts */
 function viewCard(desk, shoot, { remeasure }) {
   const { library, columns: { value: columns } } = desk;
   const sure = desk.head.value?.view_confidence;

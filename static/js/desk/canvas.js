@@ -50,16 +50,19 @@ export function drawnCanvas(life, draw, props = {}) {
   };
   const observer = new ResizeObserver(ask);
   observer.observe(canvas);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colors = null; ask(); }, { signal: life });
+  addEventListener("theme", () => { colors = null; ask(); }, { signal: life });
   life.addEventListener("abort", () => observer.disconnect());
   return { canvas, ask };
 }
 
-/** Returns the picture at an address, or null if there is none. @param {string} address @param {AbortSignal} life */
+/** Returns the picture at an address until `life` ends, or null if there is none. @param {string} address @param {AbortSignal} life */
 export async function loadPicture(address, life) {
   try {
     const answer = await fetch(address, { signal: life });
-    return answer.ok ? await createImageBitmap(await answer.blob()) : null;
+    if (!answer.ok) return null;
+    const picture = await createImageBitmap(await answer.blob());
+    life.addEventListener("abort", () => picture.close());
+    return picture;
   } catch {
     return null;
   }

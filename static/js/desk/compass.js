@@ -2,7 +2,7 @@
 // flock cannot head there.
 // @ts-check
 import { element, svg } from "../app/element.js";
-import { percent, say } from "../app/words.js";
+import { direction, percent, say } from "../app/words.js";
 import { gapsOf } from "./gaps.js";
 
 /** Radius of the compass and of the smallest petal; side of the picture. */
@@ -11,7 +11,7 @@ const [RADIUS, HOLE, SIDE] = [88, 14, 240];
 export function compass(bins) {
   const sum = bins.reduce((a, b) => a + b, 0) || 1;
   const sides = sidesOf(bins).map(([name, count]) => element("li", {}, say("desk.compass.share", { direction: say(`direction.${name}`), share: percent(count / sum) })));
-  return element("figure.compass-room", {}, compassPicture(bins), element("figcaption", {}, element("p", {}, compassWords(bins)), element("ul", {}, ...sides)));
+  return element("figure.compass-box", {}, compassPicture(bins), element("figcaption", {}, element("p", {}, compassWords(bins)), element("ul", {}, ...sides)));
 }
 
 /**
@@ -54,7 +54,6 @@ function compassWords(bins) {
   const gaps = gapsOf(bins).sort((a, b) => b[1] - a[1]);
   if (!gaps.length) return say("desk.compass.whole");
   const [first, length] = gaps[0];
-  const middle = (((first + length / 2) / bins.length) * 360 + 180) % 360;
-  const name = ["right", "down_right", "down", "down_left", "left", "up_left", "up", "up_right"][Math.round(middle / 45) % 8];
-  return say("desk.compass.missing", { direction: say(`direction.${name}`), n: Math.round((length / bins.length) * 360) });
+  const middle_rad = ((first + length / 2) / bins.length) * 2 * Math.PI - Math.PI;
+  return say("desk.compass.missing", { direction: direction(middle_rad), n: Math.round((length / bins.length) * 360) });
 }

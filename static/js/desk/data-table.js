@@ -12,8 +12,8 @@ const NAMES = ["time", "frame", "heading", "speed", "bend", "confidence"];
 export function dataTable(desk) {
   const body = element("tbody");
   const heads = NAMES.map((name) => element("th", { scope: "col" }, say(`desk.column.${name}`)));
-  const room = element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("desk.data") }, element("table", {}, element("thead", {}, element("tr", {}, ...heads)), body));
-  const details = element("details", {}, element("summary", {}, say("desk.data")), element("p.soft", {}, say("desk.data.help")), room);
+  const scroll = element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("desk.data") }, element("table", {}, element("thead", {}, element("tr", {}, ...heads)), body));
+  const details = element("details", {}, element("summary", {}, say("desk.data")), element("p.soft", {}, say("desk.data.help")), scroll);
   const fill = () => {
     const columns = desk.columns.value;
     if (!details.open || !columns.n) return;

@@ -17,5 +17,5 @@ export function downloadTable(library) {
     element("td", {}, sayOr(`desk.file.${name}`, what ?? "")),
     hasSizes && element("td.size", {}, size(size_bytes ?? 0))));
   const heads = ["name", "use", ...(hasSizes ? ["size"] : [])].map((name) => element("th", { scope: "col" }, say(`desk.files.${name}`)));
-  return element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("desk.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)));
+  return element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("desk.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)));
 }

@@ -6,7 +6,7 @@ import { emptyColumns, firstFrame, frameAt } from "./columns.js";
 
 /**
  * @typedef {{from: number, to: number, mirrored: boolean, distance: number}} Jump two clips that look alike
- * @typedef {{clip_frames: number, natural_step: number, epsilon: number, stats: any, jumps: Jump[],
+ * @typedef {{clip_frames: number, natural_step: number, stats: any, jumps: Jump[],
  *   patches: {start: Int32Array, end: Int32Array}, leaps: {from: Int32Array, to: Int32Array, mirrored: Uint8Array}}} Facts
  *   of library.json; a leap is a jump that playback may take, sorted by its first frame
  * @typedef {ReturnType<typeof createInstrument>} Instrument

@@ -45,7 +45,7 @@ export function jumpTable(desk, player) {
   };
   desk.facts.watch(fill, desk.life);
   desk.showsMirrored.watch(fill, desk.life);
-  return element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("desk.jumps.best") }, table, none);
+  return element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("desk.jumps.best") }, table, none);
 }
 
 /** @param {import("./instrument.js").Jump} one @param {import("./instrument.js").Instrument} desk @param {import("./player.js").Player} player */

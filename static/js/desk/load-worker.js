@@ -80,11 +80,11 @@ function longer(old) {
 
 /** @param {string} address */
 async function loadLibrary(address) {
-  const { clip_frames, natural_step, epsilon, stats, transitions, patches = [], playback = [] } = await (await fetched(address)).json();
+  const { clip_frames, natural_step, stats, transitions, patches = [], playback = [] } = await (await fetched(address)).json();
   const jumps = transitions.map((/** @type {any} */ one) => ({ from: one.from, to: one.to, mirrored: one.mirrored, distance: one.distance }))
     .sort((/** @type {any} */ a, /** @type {any} */ b) => a.distance - b.distance).slice(0, MOST_JUMPS);
   const column = (/** @type {any[]} */ rows, /** @type {(row: any) => number} */ of) => Int32Array.from(rows, of);
   const found = { start: column(patches, (one) => one.start), end: column(patches, (one) => one.end) };
   const leaps = { from: column(playback, ([from]) => from), to: column(playback, ([, to]) => to), mirrored: Uint8Array.from(playback, (row) => (row[3] ? 1 : 0)) };
-  page.postMessage({ library: { clip_frames, natural_step, epsilon, stats, jumps, patches: found, leaps } });
+  page.postMessage({ library: { clip_frames, natural_step, stats, jumps, patches: found, leaps } });
 }

@@ -115,7 +115,7 @@ export function createMatrix(desk, { player, pictures }) {
   const mirrored = element("input", { type: "checkbox", onchange: () => desk.showsMirrored.set(mirrored.checked) });
   desk.showsMirrored.watch((on) => { mirrored.checked = on; }, life);
   const key = element("p.matrix-key", {}, element("span.dot-plain", {}, say("desk.jumps.plain")), element("label.choice", {}, mirrored, element("span.dot-mirrored", {}, say("desk.mirrored_on"))));
-  return element("div.matrix-room", {}, canvas, key, pictured);
+  return element("div.matrix-box", {}, canvas, key, pictured);
 }
 
 /** Returns the gray of a part of the picture that only few of its cells exceed, 1 to 255. @param {ImageBitmap} picture @param {number} x @param {number} side */

@@ -9,7 +9,7 @@ import { count, percent, say, sayOr, seconds } from "../app/words.js";
  * Returns the numbers: the key of the words, the value as text, and values for the words.
  * @param {Measured} measured @returns {{key: string, value: string, values?: any}[]}
  */
-export function numbersOf({ library, facts, head = null }) {
+function numbersOf({ library, facts, head = null }) {
   const stats = facts?.stats;
   const camera = library.params?.camera;
   const beat = head?.tail_beat?.spans?.[0];
@@ -38,7 +38,7 @@ export function comparison(before, after) {
   });
   const settings = settingRows(before.library.params ?? {}, after.library.params ?? {});
   const heads = ["what", "before", "after"].map((name) => element("th", { scope: "col" }, say(`desk.compare.${name}`)));
-  return element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("desk.compare.title") }, element("table.comparison", {}, element("caption.unseen", {}, say("desk.compare.title")), element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...settings, ...rows)));
+  return element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("desk.compare.title") }, element("table.comparison", {}, element("caption.unseen", {}, say("desk.compare.title")), element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...settings, ...rows)));
 }
 
 /** Returns the words for a setting. @param {string} name */
@@ -51,7 +51,7 @@ function settingRows(before, after) {
 }
 
 /** Returns the value of a setting in words. @param {string} name @param {any} value */
-export function settingWords(name, value) {
+function settingWords(name, value) {
   if (value === null || value === undefined) return sayOr(`remeasure.${name}.null`, "–");
   const exact = (/** @type {number} */ one) => String(Number(one.toPrecision(4)));
   if (name === "camera") return say("desk.compare.camera", { cm: exact(100 * value.z_min_m), px: exact(value.pane_px_per_m / 100) });

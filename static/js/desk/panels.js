@@ -12,7 +12,7 @@ import { patchPanel } from "./patches.js";
 import { drawPath, nearestFrame } from "./path.js";
 import { weakest } from "./weakest.js";
 
-export const TABS = ["jumps", "patches", "pose", "trust", "size"];
+const TABS = ["jumps", "patches", "pose", "trust", "size"];
 
 /**
  * @param {import("./instrument.js").Instrument} desk
@@ -79,14 +79,14 @@ function pathPanel(desk, player) {
   }, { signal: life });
   for (const seen of [moment, columns]) seen.watch(ask, life);
   void loadPicture(`/v1/libraries/${library.id}/background.png`, life).then((found) => { background = found; ask(); });
-  const compassRoom = element("div");
-  facts.watch((now) => { if (now?.stats.heading_histogram) compassRoom.replaceChildren(compass(now.stats.heading_histogram)); }, life);
-  return element("div.panel-pose", {}, element("div.path-room", {}, canvas), element("p.path-key", {}, element("span", {}, say("desk.path.start")), element("i"), element("span", {}, say("desk.path.end")), element("span.soft", {}, say("desk.path.help"))), compassRoom);
+  const compassBox = element("div");
+  facts.watch((now) => { if (now?.stats.heading_histogram) compassBox.replaceChildren(compass(now.stats.heading_histogram)); }, life);
+  return element("div.panel-pose", {}, element("div.path-box", {}, canvas), element("p.path-key", {}, element("span", {}, say("desk.path.start")), element("i"), element("span", {}, say("desk.path.end")), element("span.soft", {}, say("desk.path.help"))), compassBox);
 }
 
 /** Where the measurement is sure, and the moments to look at. @param {import("./instrument.js").Instrument} desk @param {{player: any, shoot: any, remeasure: (tool?: string) => void}} parts */
 function trustPanel(desk, { player, shoot, remeasure }) {
-  const room = element("div.panel-trust", {}, element("p.soft", {}, say("desk.reading.wait")));
+  const node = element("div.panel-trust", {}, element("p.soft", {}, say("desk.reading.wait")));
   const fill = () => {
     if (!desk.isLoaded.value) return;
     const { shares, moments } = weakest(desk.columns.value, { from: desk.first, to: desk.last() + 1 });
@@ -97,21 +97,21 @@ function trustPanel(desk, { player, shoot, remeasure }) {
       const around_px = [...desk.columns.value.box_px.subarray(4 * (why === "lost" ? frame - 1 : frame)).slice(0, 4)];
       return element("li", {}, element("button.quiet", { type: "button", onclick: () => { player.pause(); desk.goTo(frame); } }, shoot({ frame, label: words, hasMarks: true, around_px }), element("span", {}, words)));
     });
-    room.replaceChildren(...[element("ul.shares", {}, ...bars), element("h3", {}, say("desk.trust.look")), moments.length ? element("ul.weak", {}, ...rows) : element("p.soft", {}, say("desk.trust.fine")),
+    node.replaceChildren(...[element("ul.shares", {}, ...bars), element("h3", {}, say("desk.trust.look")), moments.length ? element("ul.weak", {}, ...rows) : element("p.soft", {}, say("desk.trust.fine")),
       moments.length > 0 && element("p.actions", {}, ...["head", "animal"].map((tool) => element("button.quiet", { type: "button", onclick: () => remeasure(tool) }, say(`desk.trust.${tool}_at`))))].filter(Boolean));
   };
   desk.isLoaded.watch(fill, desk.life);
-  return room;
+  return node;
 }
 
 /** How large the animal is, and the way to centimetres. @param {import("./instrument.js").Instrument} desk @param {(tool?: string) => void} remeasure */
 function sizePanel(desk, remeasure) {
-  const room = element("div.panel-size");
+  const node = element("div.panel-size");
   desk.head.watch((head) => {
     const length_px = desk.library.length_px;
     const camera = head?.camera;
     const size = length_px && camera ? say("desk.size.known", { cm: (100 * length_px) / camera.pane_px_per_m, px: length_px }) : length_px ? say("desk.size.px", { px: length_px }) : say("desk.size.none");
-    room.replaceChildren(element("p", {}, size), element("p.soft", {}, say(camera ? "desk.size.again" : "desk.size.help")), element("p", {}, element("button.quiet", { type: "button", onclick: () => remeasure("ruler") }, say("desk.size.ruler"))));
+    node.replaceChildren(element("p", {}, size), element("p.soft", {}, say(camera ? "desk.size.again" : "desk.size.help")), element("p", {}, element("button.quiet", { type: "button", onclick: () => remeasure("ruler") }, say("desk.size.ruler"))));
   }, desk.life);
-  return room;
+  return node;
 }

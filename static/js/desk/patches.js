@@ -36,20 +36,24 @@ export function patchPanel(desk, { player, pictures, chosen }) {
     current = k;
     later();
   };
+  const patches = () => /** @type {import("./instrument.js").Facts} */ (facts.value).patches;
   const timed = (/** @type {number} */ frame) => desk.timeOf(frame).toFixed(2);
   const patchWords = (/** @type {number} */ k) => {
-    const { start, end } = facts.value.patches;
+    const { start, end } = patches();
     return say("desk.patch.is", { id: String(k), from: timed(start[k]), to: timed(end[k] - 1), n: end[k] - start[k] });
   };
   const walk = (/** @type {number} */ frame) => () => { player.pause(); desk.goTo(frame); };
 
-  /** Returns the button of one patch. @param {number} k @param {{mirrored?: boolean, isNext?: boolean, act: () => void}} options */
-  function patchButton(k, { mirrored = false, isNext = false, act }) {
-    const { start, end } = facts.value.patches;
+  /**
+   * Returns the button of one patch. @param {number} k
+   * @param {{way: "next" | "jump" | "listed", mirrored?: boolean, act: () => void}} options way: how it is reached from the moment
+   */
+  function patchButton(k, { way, mirrored = false, act }) {
+    const { start, end } = patches();
     const picture = element("canvas", { width: SIDE, height: SIDE, "aria-hidden": "true" });
-    const kind = isNext ? say("desk.patch.on") : say(mirrored ? "desk.jumps.mirrored" : "desk.jumps.plain");
-    const words = element("span", {}, element("strong", {}, say("desk.patch.name", { id: String(k) })), " ", element("small", {}, say("desk.patch.when", { time: timed(start[k]), n: end[k] - start[k] })), isNext === null ? null : element("small.kind", {}, kind));
-    const node = element("li", { className: mirrored ? "mirrored" : isNext ? "goes-on" : "" }, element("button.quiet", { type: "button", onclick: act }, picture, curveOf(desk.columns.value, start[k], end[k], mirrored), words));
+    const kind = way === "next" ? say("desk.patch.on") : say(mirrored ? "desk.jumps.mirrored" : "desk.jumps.plain");
+    const words = element("span", {}, element("strong", {}, say("desk.patch.name", { id: String(k) })), " ", element("small", {}, say("desk.patch.when", { time: timed(start[k]), n: end[k] - start[k] })), way !== "listed" && element("small.kind", {}, kind));
+    const node = element("li", { className: mirrored ? "mirrored" : way === "next" ? "goes-on" : "" }, element("button.quiet", { type: "button", onclick: act }, picture, curveOf(desk.columns.value, start[k], end[k], mirrored), words));
     return { node, wish: { frame: start[k], canvas: picture, mirrored } };
   }
 
@@ -59,22 +63,22 @@ export function patchPanel(desk, { player, pictures, chosen }) {
     const found = facts.value;
     const k = current;
     if (!found || !desk.isLoaded.value || chosen.value !== "patches" || life.aborted) return;
-    const { patches, leaps } = found;
+    const { patches: { start, end }, leaps } = found;
     if (drawn === String(k)) return;
     drawn = String(k);
-    const isAfter = k >= 0 && patches.start[k + 1] === patches.end[k];
-    const on = k < 0 ? [] : leapsFrom(leaps, patches.end[k] - 1);
+    const isAfter = k >= 0 && start[k + 1] === end[k];
+    const on = k < 0 ? [] : leapsFrom(leaps, end[k] - 1);
     const buttons = [
-      ...(isAfter ? [patchButton(k + 1, { isNext: true, act: walk(patches.start[k + 1]) })] : []),
+      ...(isAfter ? [patchButton(k + 1, { way: "next", act: walk(start[k + 1]) })] : []),
       ...on.slice(0, MOST).flatMap(({ from, to, mirrored }) => {
-        const target = patchAt(patches, to);
-        return target < 0 ? [] : [patchButton(target, { mirrored, act: () => player.playJump({ from, to, mirrored }) })];
+        const target = patchAt(found.patches, to);
+        return target < 0 ? [] : [patchButton(target, { way: "jump", mirrored, act: () => player.playJump({ from, to, mirrored }) })];
       })];
     const hadFocus = ways.contains(document.activeElement);
     waysOn.hidden = !buttons.length;
     ways.replaceChildren(...buttons.map(({ node }) => node));
     if (hadFocus) ways.querySelector("button")?.focus({ preventScroll: true });
-    const best = longest.childElementCount ? [] : longestPatches(patches, LONGEST).map((one) => patchButton(one, { isNext: /** @type {any} */ (null), act: walk(patches.start[one]) }));
+    const best = longest.childElementCount ? [] : longestPatches(found.patches, LONGEST).map((one) => patchButton(one, { way: "listed", act: walk(start[one]) }));
     if (best.length) longest.replaceChildren(...best.map(({ node }) => node));
     void pictures.loaded.then(() => pictures.fill([...buttons, ...best].map(({ wish }) => wish)));
   };

@@ -1,5 +1,6 @@
 // Pictures of the animal in single frames: sprites of the atlas, or cuts out of the film where there is no atlas.
 // @ts-check
+import { releaseVideo } from "../app/element.js";
 import { loadAtlas } from "../flock/atlas.js";
 import { hasFile } from "./instrument.js";
 
@@ -8,8 +9,9 @@ const AROUND = 1.25;
 
 /** @typedef {ReturnType<typeof createPictures>} Pictures */
 
-/** @param {import("./instrument.js").Instrument} desk @param {{library: any}} options */
-export function createPictures(desk, { library }) {
+/** @param {import("./instrument.js").Instrument} desk */
+export function createPictures(desk) {
+  const { library } = desk;
   const base = `/v1/libraries/${library.id}/`;
   /** @type {import("../flock/atlas.js").Atlas | null} */
   let atlas = null;
@@ -75,7 +77,7 @@ export function createPictures(desk, { library }) {
     scout.addEventListener("seeked", arrived, { signal: desk.life });
     scout.addEventListener("error", () => { wanted = []; }, { signal: desk.life });
     scout.addEventListener("loadeddata", next, { once: true });
-    desk.life.addEventListener("abort", () => scout?.removeAttribute("src"));
+    desk.life.addEventListener("abort", () => { if (scout) releaseVideo(scout); });
     return undefined;
   }
 

@@ -1,7 +1,7 @@
 // The film: plays, steps by exact frames, follows the moment, and plays jumps (a second before, the cut, a
 // second after). Where the browser cannot play the film, a clock moves the moment.
 // @ts-check
-import { element } from "../app/element.js";
+import { element, releaseVideo } from "../app/element.js";
 import { signal } from "../app/store.js";
 import { say } from "../app/words.js";
 
@@ -51,7 +51,7 @@ export function createPlayer(desk) {
   video.addEventListener("error", () => { isBroken.set(true); video.remove(); }, { signal: life });
   // A busy machine shows none of the last frames.
   video.addEventListener("ended", () => { const goesOn = cut; step(desk.last()); if (!goesOn) pause(); }, { signal: life });
-  life.addEventListener("abort", () => { video.pause(); video.removeAttribute("src"); video.load(); });
+  life.addEventListener("abort", () => releaseVideo(video));
 
   // The moment follows the playing film, and the film follows the moment when something else moved it.
   const step = (/** @type {number} */ frame) => {

@@ -9,7 +9,7 @@ export function svgPlot(plot) {
   const paths = plot.series.map(({ look }) => svg("path", { class: `line ${look}` }));
   const picture = svg("svg", { "aria-hidden": "true", preserveAspectRatio: "none" }, grid, ...paths);
   const labels = element("div.plot-labels", { "aria-hidden": "true" });
-  const node = element("div.plot-room", {}, labels, picture);
+  const node = element("div.plot-box", {}, labels, picture);
   return {
     node,
     draw({ lines, span, range, ticks, width }) {

@@ -2,6 +2,7 @@
 // uPlot's own paths join points that share a pixel column, across gaps.
 // @ts-check
 import { element } from "../app/element.js";
+import { styled } from "../app/router.js";
 import { colorsAt } from "./canvas.js";
 import { trace } from "./lines.js";
 import { LEFT, RIGHT } from "./time-axis.js";
@@ -16,7 +17,7 @@ export async function loadUplot() {
 
 /** @param {any} UPlot @param {import("./plots.js").Plot} plot @param {AbortSignal} life @returns {import("./plots.js").Plotter} */
 function uplot(UPlot, plot, life) {
-  const node = element("div.plot-room.plot-uplot", { "aria-hidden": "true" });
+  const node = element("div.plot-box.plot-uplot", { "aria-hidden": "true" });
   /** @type {import("./plots.js").Drawing} */
   let drawing = { lines: [], span: [0, 1], range: [0, 1], ticks: [], width: 1 };
   /** @type {Record<string, string>} */
@@ -59,10 +60,4 @@ function uplot(UPlot, plot, life) {
       made.redraw(true, true);
     },
   };
-}
-
-/** Loads a style sheet once and waits for it. @param {string} href */
-function styled(href) {
-  if (document.querySelector(`link[href="${href}"]`)) return undefined;
-  return new Promise((resolve) => document.head.append(element("link", { rel: "stylesheet", href, onload: resolve, onerror: resolve })));
 }

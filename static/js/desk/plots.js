@@ -74,7 +74,7 @@ export function createPlots(desk) {
   const observer = new ResizeObserver(ask);
   observer.observe(rows[0].node);
   desk.life.addEventListener("abort", () => observer.disconnect());
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", ask, { signal: desk.life });
+  addEventListener("theme", ask, { signal: desk.life });
 
   // Nothing is drawn twice: the plots wait for the answer whether uPlot was built.
   import("./plot-uplot.js").then(({ loadUplot }) => loadUplot()).catch(() => null).then((uplot) => {

@@ -1,5 +1,5 @@
-// The settings that "Measure again" sends: those that differ from the defaults of the service, so that settings of
-// the former measurement stay and nothing else is said.
+// The settings that "Measure again" sends: those that differ from the defaults of the service. They include the
+// settings of the former measurement, unless the person changed them.
 // @ts-check
 
 /**

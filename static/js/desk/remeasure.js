@@ -9,6 +9,7 @@ import { count, say } from "../app/words.js";
 import { mendsOf } from "../parts/mend.js";
 import { problemBox, showProblem } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
+import { analysisDefaults } from "../studio/schema.js";
 import { choice, part, rulerFields, slide } from "./remeasure-fields.js";
 import { changedParams, sizeFromRuler } from "./remeasure-params.js";
 import { createPicture } from "./remeasure-picture.js";
@@ -25,8 +26,8 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   player.pause();
   const closing = new AbortController();
   const life = closing.signal;
-  const defaults = await defaultParams(desk.life);
-  if (document.querySelector("dialog.remeasure")) return;
+  const defaults = await analysisDefaults();
+  if (desk.life.aborted || document.querySelector("dialog.remeasure")) return;
   const former = { ...defaults, ...library.params };
   const draft = signal({ ...former, ...params, ignore: params.ignore ?? former.ignore ?? [] });
   const tool = signal(/** @type {any} */ (TOOLS.includes(first) ? first : "animal"));
@@ -64,7 +65,7 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   const form = element("form", { method: "dialog" },
     element("header.place-head", {}, element("h2", {}, say("remeasure.title")), element("button.quiet", { type: "button", onclick: () => dialog.close() }, say("cancel"))),
     element("div.remeasure-columns", {},
-      element("div.remeasure-left", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("remeasure.tools")), ...radios), help, element("div.remeasure-room", {}, picture), frame, size, marks),
+      element("div.remeasure-left", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("remeasure.tools")), ...radios), help, element("div.remeasure-box", {}, picture), frame, size, marks),
       element("div.remeasure-right", {}, choice(draft, "view", [null, "side", "top"]), choice(draft, "follow", ["one", "largest"]), slide(draft, "threshold", { min: 1, max: 100, step: 1 }), part(draft, desk), slide(draft, "kappa", { min: 1, max: 6, step: 0.5 }), choice(draft, "sprites", ["auto", "always"]),
         element("label.field", {}, say("remeasure.preset"), presets, element("small", {}, say("remeasure.preset.help"))))),
     element("footer.remeasure-foot", {}, sent, problem, start));
@@ -87,12 +88,6 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   desk.life.addEventListener("abort", () => dialog.close());
   dialog.showModal();
   if (first === "part") form.elements.from_s.focus();
-}
-
-/** Returns the defaults of all parameters of an analysis. @param {AbortSignal} life @returns {Promise<Record<string, any>>} */
-async function defaultParams(life) {
-  const { components } = await get("/openapi.json", life);
-  return Object.fromEntries(Object.entries(components.schemas.AnalysisParams.properties).map(([name, property]) => [name, /** @type {any} */ (property).default ?? null]));
 }
 
 /** Shows an analysis while it runs, and its numbers beside the former ones. @param {import("./instrument.js").Instrument} desk */

@@ -1,7 +1,7 @@
 // Still pictures out of the film: a frame, or the surroundings of a box in it, with the box or the measurement drawn
 // over it. A copy of the film is opened when the first picture comes into view, and fills one picture after another.
 // @ts-check
-import { element } from "../app/element.js";
+import { element, releaseVideo } from "../app/element.js";
 import { colorsAt, loadPicture } from "./canvas.js";
 import { drawMarks } from "./marks.js";
 
@@ -36,7 +36,7 @@ export function createShots(desk) {
     film.addEventListener("loadeddata", seek, { once: true });
     film.addEventListener("seeked", arrived, { signal: life });
     film.addEventListener("error", () => void fail(), { signal: life });
-    life.addEventListener("abort", () => film?.removeAttribute("src"));
+    life.addEventListener("abort", () => { if (film) releaseVideo(film); });
   }
   const observer = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) {
@@ -87,6 +87,6 @@ export function createShots(desk) {
     const canvas = element("canvas.shot", { width: WIDE, height: Math.round((WIDE * h) / w), role: "img", "aria-label": shot.label });
     shots.set(canvas, shot);
     observer.observe(canvas);
-    return element("div.shot-room", {}, canvas);
+    return element("div.shot-box", {}, canvas);
   };
 }

@@ -32,7 +32,6 @@ export function createStage(desk, { player, pictures }) {
     const [w, h] = library.image_size_px;
     const { zoom, left, top } = fitted([w, h], width, height);
     if (isMirrored) { context.translate(width, 0); context.scale(-1, 1); }
-    context.save();
     if (look.value === "sprite") return drawAnimal(context, k, { width, height, colors });
     context.translate(left, top);
     context.scale(zoom, zoom);
@@ -40,7 +39,7 @@ export function createStage(desk, { player, pictures }) {
     else if (background && (look.value === "background" || player.isBroken.value)) context.drawImage(background, 0, 0, w, h);
     if (look.value === "background") drawPath(context, columns.value, { zoom, colors });
     if (showsMarks.value) drawMarks(context, columns.value, k, { zoom, colors, isMoving: look.value === "film" || look.value === "difference" });
-    return context.restore();
+    return undefined;
   }
 
   /** Draws how much the film differs from the background, four times as strong: what the threshold judges. */
@@ -69,7 +68,6 @@ export function createStage(desk, { player, pictures }) {
       context.translate(-at[0], -at[1]);
       drawMarks(context, columns.value, k, { zoom, colors, isMoving: false });
     }
-    context.restore();
   }
 
   const tell = () => {

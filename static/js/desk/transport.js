@@ -12,8 +12,8 @@ const SHAPES = {
   jump: "M3 18c2-12 14-14 17-3m0 0l-5-1m5 1l2-5",
 };
 
-/** @param {string} shape */
-const icon = (shape) => svg("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" }, svg("path", { d: shape }));
+/** The shape of the jump is a line, the others are filled. @param {keyof typeof SHAPES} name */
+const icon = (name) => svg("svg", { viewBox: "0 0 24 24", "aria-hidden": "true", class: name === "jump" ? "icon-line" : "" }, svg("path", { d: SHAPES[name] }));
 
 /**
  * @param {import("./instrument.js").Instrument} desk
@@ -21,10 +21,10 @@ const icon = (shape) => svg("svg", { viewBox: "0 0 24 24", "aria-hidden": "true"
  */
 export function createTransport(desk, { player, nextJump }) {
   const { moment, life } = desk;
-  const button = (/** @type {keyof typeof SHAPES} */ shape, /** @type {string} */ key, /** @type {() => void} */ act) => element("button.quiet.icon", { type: "button", title: say(key), "aria-label": say(key), onclick: act }, icon(SHAPES[shape]));
+  const button = (/** @type {keyof typeof SHAPES} */ shape, /** @type {string} */ key, /** @type {() => void} */ act) => element("button.quiet.icon", { type: "button", title: say(key), "aria-label": say(key), onclick: act }, icon(shape));
   const play = button("play", "desk.play", player.toggle);
   player.isPlaying.watch((isPlaying) => {
-    play.replaceChildren(icon(isPlaying ? SHAPES.pause : SHAPES.play));
+    play.replaceChildren(icon(isPlaying ? "pause" : "play"));
     for (const name of ["title", "aria-label"]) play.setAttribute(name, say(isPlaying ? "desk.pause" : "desk.play"));
   }, life);
   const field = element("input#desk-frame", { type: "number", min: desk.first, step: 1, inputMode: "numeric", "aria-label": say("desk.frame") });

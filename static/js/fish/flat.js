@@ -1,6 +1,6 @@
 // The film of the virtual fish, in step with the other one, for browsers without WebGL 2.
 // @ts-check
-import { element } from "../app/element.js";
+import { element, releaseVideo } from "../app/element.js";
 import { say } from "../app/words.js";
 
 /** Time by which it may run ahead or behind while it plays, s. */
@@ -19,7 +19,7 @@ export function createFlat({ id, fps, size, life }) {
   };
   video.addEventListener("seeked", () => { isSeeking = false; if (video.paused) seek(); }, { signal: life });
   video.addEventListener("loadedmetadata", seek, { signal: life });
-  life.addEventListener("abort", () => { video.pause(); video.removeAttribute("src"); video.load(); });
+  life.addEventListener("abort", () => releaseVideo(video));
   return {
     node, controls: element("p.soft", {}, say("fish.no_webgl")),
     setFrame(/** @type {number} */ next) {

@@ -1,13 +1,13 @@
 // The options of a virtual fish, read from the schema of the service, and the job that makes one.
 // @ts-check
-import { get, post } from "../app/api.js";
+import { post } from "../app/api.js";
 import { element } from "../app/element.js";
 import { ended, expect, resultOf } from "../app/jobs.js";
 import { say } from "../app/words.js";
 import { problemBox } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
 import { control } from "../studio/control.js";
-import { fieldsOf } from "../studio/schema.js";
+import { loadFields } from "../studio/schema.js";
 import { changedFrom, PAPERS, shownAs } from "./settings.js";
 
 /** Names in the order of use; the service may tell more. */
@@ -17,8 +17,7 @@ const ORDER = ["palette", "swim", "bank_rad", "smooth_s", "bridge_s", "length_m"
  * @param {{library: any, params: any, life: AbortSignal, onMade: (id: string) => void}} options params: of the fish that is shown, null = none
  */
 export async function optionsBox({ library, params, life, onMade }) {
-  const { components } = await get("/openapi.json", life);
-  const fields = new Map([...fieldsOf(components.schemas, "FishParams", "FishRequest")].map(([name, field]) => [name, shownAs(field, library)]));
+  const fields = new Map([...await loadFields("Fish")].map(([name, field]) => [name, shownAs(field, library)]));
   const names = [...new Set([...ORDER, ...fields.keys()])].filter((name) => fields.has(name) && name !== "preset");
   let settings = changedFrom(params, fields);
   /** @param {Record<string, any>} patch undefined = the default */

@@ -1,6 +1,7 @@
 // Film and virtual fish side by side with one play head.
 // @ts-check
 import { element } from "../app/element.js";
+import { isCalm } from "../app/motion.js";
 import { say } from "../app/words.js";
 import { timeline } from "../parts/timeline.js";
 import { film } from "../reel/film.js";
@@ -8,7 +9,7 @@ import { createFlat } from "./flat.js";
 import { startKeys } from "./keys.js";
 import { filmLens } from "./lens.js";
 import { createWireframe } from "./wireframe.js";
-import { postureAt, roomOf } from "./posture.js";
+import { postureAt, boundsOf } from "./posture.js";
 import { createSpace, directionText } from "./space.js";
 
 /**
@@ -63,7 +64,7 @@ export function createPair({ library, id, fish, startFrame, life, onRest }) {
   const left = element("div.stage.film-stage", { "data-look": "film", onclick: toggle }, player.node, wireframe?.canvas, note);
   left.style.aspectRatio = size.join(" / ");
   const shows = element("input", { type: "checkbox", checked: true, onchange: () => { if (wireframe) wireframe.canvas.hidden = !shows.checked; } });
-  startKeys(life, { move: (by) => seek(frame + by), go: seek, last: n - 1, toggle, orbit: space?.orbit });
+  if (space) startKeys(life, space.orbit);
   const node = element("div.fish-pair", {},
     element("section.fish-side", { "aria-label": say("fish.left") }, element("h2", {}, say("fish.left")), left, wireframe ? element("div.stage-controls", {}, element("label.choice", {}, shows, element("span", {}, say("fish.wireframe")))) : null),
     element("section.fish-side", { "aria-label": say("fish.right") }, element("h2", {}, say("fish.right")), (space ?? flat)?.node, (space ?? flat)?.controls),
@@ -72,9 +73,9 @@ export function createPair({ library, id, fish, startFrame, life, onRest }) {
   time.setSpan(n, fps);
   show(startFrame ?? 0);
   if (startFrame !== null) player.seek(frame);
-  if (startFrame === null && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.play();
+  if (startFrame === null && !isCalm()) player.play();
   return node;
 }
 
 /** Returns the farthest depth of the fish, metres. @param {import("./glb.js").VirtualFish} fish */
-const reachOf = (fish) => Math.max(1e-3, -roomOf(fish).low[2]);
+const reachOf = (fish) => Math.max(1e-3, -boundsOf(fish).low[2]);

@@ -29,7 +29,7 @@ export const placeAt = ({ places }, k) => [places[3 * k], places[3 * k + 1], pla
 export const isShownAt = ({ shown }, k) => !shown || shown[3 * k] > 0;
 
 /** Returns the box that holds the middle of the fish in all frames in which it is shown. @param {VirtualFish} fish */
-export function roomOf(fish) {
+export function boundsOf(fish) {
   const [low, high] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
   for (let k = 0; k < fish.nFrames; k++) {
     if (!isShownAt(fish, k)) continue;

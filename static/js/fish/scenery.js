@@ -8,12 +8,12 @@ import { isShownAt, placeAt } from "./posture.js";
 const WAY_S = 2;
 /** Share of the length of the fish between two lines of the floor. */
 const SQUARE_BL = 1;
-/** Most lines of the floor in one direction; in a large room, its squares are larger. */
+/** Most lines of the floor in one direction; within large bounds, its squares are larger. */
 const MOST_LINES = 40;
 
 /**
  * Returns the floor: below a fish filmed from the side, behind one filmed from above.
- * @param {{low: number[], high: number[]}} room @param {number} length of the fish @param {boolean} isFromAbove
+ * @param {{low: number[], high: number[]}} bounds @param {number} length of the fish @param {boolean} isFromAbove
  */
 export function floorOf({ low, high }, length, isFromAbove) {
   const [across, along, up] = isFromAbove ? [0, 1, 2] : [0, 2, 1];

@@ -6,7 +6,7 @@ import { boxOf, glCanvas } from "./gl-canvas.js";
 import { lengthOf } from "./glb.js";
 import { depthFor, freeLens } from "./lens.js";
 import { createOrbit, viewOf } from "./orbit.js";
-import { directionOf, postureAt, roomOf } from "./posture.js";
+import { directionOf, postureAt, boundsOf } from "./posture.js";
 import { floorOf, plumbOf, wayOf } from "./scenery.js";
 import { followPointers, turnButtons } from "./turning.js";
 
@@ -21,10 +21,10 @@ const LINES = { floor: [0.45, 0.75, 0.82, 0.28], way: [1, 0.62, 0.4, 0.85], plum
  * @returns {{node: HTMLElement, canvas: HTMLCanvasElement, controls: HTMLElement, setFrame: (frame: number) => void, orbit: import("./orbit.js").Orbit} | null}
  */
 export function createSpace({ fish, lens, size, fps, isFromAbove, life }) {
-  const [length, room] = [lengthOf(fish), roomOf(fish)];
-  const middle = room.low.map((value, axis) => (value + room.high[axis]) / 2);
-  const radius = Math.hypot(...room.high.map((value, axis) => value - room.low[axis])) / 2 + 0.8 * length;
-  const floor = floorOf(room, length, isFromAbove);
+  const [length, bounds] = [lengthOf(fish), boundsOf(fish)];
+  const middle = bounds.low.map((value, axis) => (value + bounds.high[axis]) / 2);
+  const radius = Math.hypot(...bounds.high.map((value, axis) => value - bounds.low[axis])) / 2 + 0.8 * length;
+  const floor = floorOf(bounds, length, isFromAbove);
   let [frame, view] = [0, "near"];
   const made = glCanvas({ fish, life, props: { className: "space", tabIndex: 0 }, sceneAt });
   if (!made) return null;

@@ -8,25 +8,23 @@ import { choiceOf } from "../studio/control.js";
 import { deleted, deleteLater } from "../parts/undo.js";
 import { savedName } from "./settings.js";
 
-/** Pages of the list that are searched for the fish of a film. */
-const MOST_PAGES = 10;
 /** Time in which the browser begins to save a file, ms. */
 const KEPT_MS = 60_000;
 
 /** Returns the virtual fish of a library, newest first. @param {string} libraryId @param {AbortSignal} life */
 export async function fishOf(libraryId, life) {
   const found = [];
-  let address = /** @type {string | null} */ ("/v1/fish?limit=200");
-  for (let page = 0; address && page < MOST_PAGES; page++) {
+  let address = /** @type {string | null} */ (`/v1/fish?library_id=${encodeURIComponent(libraryId)}&limit=200`);
+  while (address) {
     const { items, next } = await list(address, life);
-    found.push(...items.filter((one) => one.library_id === libraryId && !deleted.value.has(one.id)));
+    found.push(...items.filter((one) => !deleted.value.has(one.id)));
     address = next;
   }
   return found;
 }
 
 /**
- * Saves a file under the page's name: the one that the service tells has the id instead of the film.
+ * Saves a file under a name that tells this fish from others of its film. The service's name has only the film.
  * @param {MouseEvent} event @param {string} href @param {string} download
  */
 async function save(event, href, download) {
@@ -42,7 +40,7 @@ async function save(event, href, download) {
 }
 
 /** Returns what a virtual fish is, in a few words. @param {any} fish */
-export const fishName = ({ params }) => [choiceOf("palette", params.palette ?? ""), params.swim === false && say("fish.rigid"), params.bank_rad === 0 && say("fish.upright")].filter(Boolean).join(", ");
+const fishName = ({ params }) => [choiceOf("palette", params.palette ?? ""), params.swim === false && say("fish.rigid"), params.bank_rad === 0 && say("fish.upright")].filter(Boolean).join(", ");
 
 /**
  * Returns the table of the fish of a film with their downloads.
@@ -71,5 +69,5 @@ export function versionTable(all, { library, shown, life, onDelete }) {
   });
   const heads = ["which", "model", "film", "size", "delete"].map((name) => element("th", { scope: "col" }, name === "delete" ? element("span.unseen", {}, say("reel.delete")) : say(`fish.table.${name}`)));
   return element("section", {}, element("h2", {}, say("fish.files")), element("p.soft", {}, say("fish.files.help")),
-    element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("fish.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
+    element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("fish.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
 }

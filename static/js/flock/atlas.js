@@ -1,6 +1,7 @@
 // Loads an atlas: the animal of every playable frame, packed into a few pictures
 // (docs/reference/formats.md, "Atlas").
 // @ts-check
+import { request } from "../app/api.js";
 
 /**
  * @typedef {{page: number, x: number, y: number, w: number, h: number, cx: number, cy: number}} Sprite its box
@@ -15,11 +16,11 @@
  * @returns {Promise<Atlas>}
  */
 export async function loadAtlas(base, { small = false, signal } = {}) {
-  const table = await (await get(`${base}atlas.json`, signal)).json();
+  const table = await (await request("GET", `${base}atlas.json`, { signal })).json();
   const sheet = table.sheets?.at(small ? -1 : 0);
   const spriteOf = lookup(table, sheet);
   const loads = await Promise.allSettled(sheet.pages.map(async ({ file }) => {
-    const blob = await (await get(base + encodeURIComponent(file), signal)).blob();
+    const blob = await (await request("GET", base + encodeURIComponent(file), { signal })).blob();
     // Premultiplied, so that interpolation never mixes in the color of transparent pixels.
     return createImageBitmap(blob, { premultiplyAlpha: "premultiply", colorSpaceConversion: "none" });
   }));
@@ -45,10 +46,4 @@ export function lookup(table, sheet) {
     sprites.set(frame, { page, x, y, w, h, cx: x + cx * sheet.scale, cy: y + cy * sheet.scale });
   }
   return (/** @type {number} */ sourceFrame) => sprites.get(sourceFrame) ?? null;
-}
-
-async function get(path, signal) {
-  const answer = await fetch(path, { signal });
-  if (!answer.ok) throw new Error(`The service answered with ${answer.status} for ${path}.`);
-  return answer;
 }

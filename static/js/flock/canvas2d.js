@@ -52,7 +52,7 @@ export function canvasDrawer(canvas, scene) {
     on.drawImage(scene.atlas.pages[sprite.page], sprite.x, sprite.y, sprite.w, sprite.h, sprite.x - sprite.cx, sprite.y - sprite.cy, sprite.w, sprite.h);
   }
 
-  return { kind: "2d", setScene: (next) => { scene = next; }, draw, dispose() {} };
+  return { setScene: (next) => { scene = next; }, draw, dispose() {} };
 }
 
 /** @param {any} context @param {import("./drawer.js").Background} background @param {HTMLCanvasElement} canvas */

@@ -1,4 +1,4 @@
-// Says what a frame of a flock shows, for people who do not see it.
+// What a frame of a flock shows, for people who do not see it.
 // @ts-check
 
 /** Individuals within this distance are of one group, body lengths, as in the statistics of a flock. */
@@ -8,7 +8,6 @@ const REST_BL_PER_S = 0.1;
 /** Frames before and after, between which the direction of motion is taken. */
 const REACH = 5;
 const DIRECTIONS = ["right", "down", "left", "up"];
-const NUMBERS = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine"];
 
 /**
  * Returns how many individuals there are, where most of them (three fifths) head, whether most rest, and in
@@ -31,17 +30,6 @@ export function factsOf(plan, frame) {
   const most = 0.6 * plan.nIndividuals;
   const heading = DIRECTIONS.find((_, k) => heads[k] >= most) ?? null;
   return { n: plan.nIndividuals, heading, isResting: nResting >= most, nGroups: groups(points, GROUP_BL * plan.lengthPx) };
-}
-
-/**
- * Returns a sentence such as "20 goldfish, most heading left, two groups".
- * @param {import("./plan.js").Plan} plan @param {number} frame @param {string} name of the animals, in the plural
- */
-export function describe(plan, frame, name = "animals") {
-  const { n, heading, isResting, nGroups } = factsOf(plan, frame);
-  const [most, group] = [n > 1 ? "most " : "", nGroups > 1 ? "groups" : "group"];
-  const motion = isResting ? `${most}resting` : heading ? `${most}heading ${heading}` : "heading in different directions";
-  return `${n} ${name}, ${motion}${n > 1 ? `, ${NUMBERS[nGroups] ?? nGroups} ${group}` : ""}`;
 }
 
 /** Returns the number of groups of points that links up to `reach` connect. */

@@ -8,7 +8,7 @@ import { glDrawer } from "./gl.js";
  * @typedef {{atlas: import("./atlas.js").Atlas, background: Background, sizePx: number[],
  *   haze: {perBl: number, lengthPx: number, color: number[]}}} Scene what stays from frame to frame
  * @typedef {{appearances: import("./appearance.js").Appearance[], opacity: number}} Layer
- * @typedef {{kind: "webgl2" | "2d", setScene: (scene: Scene) => void, draw: (layers: Layer[]) => void,
+ * @typedef {{setScene: (scene: Scene) => void, draw: (layers: Layer[]) => void,
  *   dispose: () => void}} Drawer `dispose` gives up the context: the canvas cannot be drawn on after it
  */
 
@@ -18,11 +18,11 @@ const MOST_ZOOM = 2;
 /**
  * The canvas takes the shape of the picture; its style decides the size. All scenes have pictures of one size.
  * @param {HTMLCanvasElement} canvas @param {Scene} scene
- * @param {{kind?: "2d", onResize?: () => void}} [options] kind "2d" does without WebGL
+ * @param {{onResize?: () => void}} [options]
  * @returns {Promise<Drawer>}
  */
-export async function createDrawer(canvas, scene, { kind, onResize = () => {} } = {}) {
-  const drawer = (kind !== "2d" && glDrawer(canvas, scene)) || (await import("./canvas2d.js")).canvasDrawer(canvas, scene);
+export async function createDrawer(canvas, scene, { onResize = () => {} } = {}) {
+  const drawer = glDrawer(canvas, scene) ?? (await import("./canvas2d.js")).canvasDrawer(canvas, scene);
   const [width, height] = scene.sizePx;
   const fit = () => {
     const zoom = Math.min(MOST_ZOOM, Math.min(canvas.clientWidth / width, canvas.clientHeight / height) * devicePixelRatio || 1);
@@ -52,8 +52,18 @@ export function sceneOf({ head, sizePx, lengthPx }, atlas, picture) {
   };
 }
 
+/** Mean colors of pictures. @type {WeakMap<ImageBitmap, number[]>} */
+const means = new WeakMap();
+
 /** Returns the mean color of a picture: the color of haze. @param {ImageBitmap} picture */
 function meanOf(picture) {
+  const mean = means.get(picture) ?? measuredMean(picture);
+  means.set(picture, mean);
+  return mean;
+}
+
+/** @param {ImageBitmap} picture */
+function measuredMean(picture) {
   const { width, height } = picture;
   const canvas = Object.assign(document.createElement("canvas"), { width, height });
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));

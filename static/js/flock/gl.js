@@ -55,11 +55,14 @@ export function glDrawer(canvas, scene) {
     }
   }
 
-  /** @param {Scene} next */
+  /** Loads only what is another one: the atlas of a library takes longer than a frame. @param {Scene} next */
   function setScene(next) {
-    made.free();
+    const former = scene;
     scene = next;
-    made = build(gl, scene);
+    if (former.atlas === next.atlas) return prepare(gl, made, next, former);
+    made.free();
+    made = build(gl, next);
+    return undefined;
   }
 
   function dispose() {
@@ -69,7 +72,7 @@ export function glDrawer(canvas, scene) {
     // Browsers limit the number of contexts, and collect them late.
     gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
-  return { kind: "webgl2", setScene, draw, dispose };
+  return { setScene, draw, dispose };
 }
 
 /** @param {import("./appearance.js").Appearance} one @param {Scene} scene */
@@ -87,17 +90,8 @@ function readFrom(gl, first) {
 }
 
 /** Fills a new or restored context with everything that stays. @param {WebGL2RenderingContext} gl @param {Scene} scene */
-function build(gl, { atlas, background: { picture, color }, sizePx, haze }) {
+function build(gl, scene) {
   const { background, single, fading } = programs(gl);
-  gl.useProgram(background.program);
-  gl.uniform1i(background.at("kind"), picture ? KINDS.picture : color ? KINDS.color : KINDS.checkers);
-  gl.uniform3fv(background.at("color"), color ?? [0, 0, 0]);
-  for (const { program, at } of [single, fading]) {
-    gl.useProgram(program);
-    gl.uniform1i(at("pages"), 1);
-    gl.uniform2f(at("size"), sizePx[0], sizePx[1]);
-    gl.uniform3fv(at("haze"), haze.color);
-  }
   gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   const buffer = gl.createBuffer();
   gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
@@ -107,8 +101,7 @@ function build(gl, { atlas, background: { picture, color }, sizePx, haze }) {
   }
   readFrom(gl, 0);
   const plate = texture(gl, gl.TEXTURE0, gl.TEXTURE_2D);
-  if (picture) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, picture);
-  const { pages } = atlas;
+  const { pages } = scene.atlas;
   const sheet = texture(gl, gl.TEXTURE1, gl.TEXTURE_2D_ARRAY);
   gl.texStorage3D(gl.TEXTURE_2D_ARRAY, 1, gl.RGBA8, Math.max(...pages.map((page) => page.width)), Math.max(...pages.map((page) => page.height)), pages.length);
   for (const [k, page] of pages.entries()) {
@@ -119,8 +112,26 @@ function build(gl, { atlas, background: { picture, color }, sizePx, haze }) {
     for (const one of [plate, sheet]) gl.deleteTexture(one);
     gl.deleteBuffer(buffer);
   };
-  const withOpacity = (kind) => ({ program: kind.program, opacity: kind.at("opacity") });
-  return { background, single: withOpacity(single), fading: withOpacity(fading), free };
+  const withOpacity = (kind) => ({ ...kind, opacity: kind.at("opacity") });
+  const made = { background, single: withOpacity(single), fading: withOpacity(fading), free };
+  prepare(gl, made, scene);
+  return made;
+}
+
+/** Sets what may differ between two scenes of one atlas. @param {WebGL2RenderingContext} gl @param {any} made @param {Scene} scene @param {Scene} [former] */
+function prepare(gl, { background, single, fading }, { background: { picture, color }, sizePx, haze }, former) {
+  gl.useProgram(background.program);
+  gl.uniform1i(background.at("kind"), picture ? KINDS.picture : color ? KINDS.color : KINDS.checkers);
+  gl.uniform3fv(background.at("color"), color ?? [0, 0, 0]);
+  for (const { program, at } of [single, fading]) {
+    gl.useProgram(program);
+    gl.uniform1i(at("pages"), 1);
+    gl.uniform2f(at("size"), sizePx[0], sizePx[1]);
+    gl.uniform3fv(at("haze"), haze.color);
+  }
+  if (!picture || picture === former?.background.picture) return;
+  gl.activeTexture(gl.TEXTURE0);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, picture);
 }
 
 /** Returns a new, smooth texture, bound to a unit. @param {WebGL2RenderingContext} gl @param {number} unit @param {number} kind */

@@ -1,6 +1,8 @@
 // The play head of a flock. It follows real time at the plan's frame rate and shows whole frames only.
 // @ts-check
 
+import { reducedMotion } from "../app/motion.js";
+
 /** @typedef {import("./appearance.js").Source} Source */
 
 const CROSS_FADE_MS = 150;
@@ -16,26 +18,23 @@ const BROWSER = {
 
 /**
  * @param {{draw: (layers: import("./drawer.js").Layer[]) => void}} drawer @param {Source} source
- * @param {{onFrame?: (frame: number) => void, onState?: (isPlaying: boolean) => void, loop?: boolean, clock?: typeof BROWSER}} [options]
+ * @param {{onFrame?: (frame: number) => void, onState?: (isPlaying: boolean) => void, clock?: typeof BROWSER}} [options]
  *   onFrame receives the frame of the time line whenever it changes
  */
-export function createPlayer(drawer, source, { onFrame = () => {}, onState = () => {}, loop = true, clock = BROWSER } = {}) {
-  let [position, speed, isPlaying, isSeen] = [0, 1, false, true];
+export function createPlayer(drawer, source, { onFrame = () => {}, onState = () => {}, clock = BROWSER } = {}) {
+  let [position, isPlaying, isSeen] = [0, false, true];
   let [request, last, shown] = [0, 0, -1];
   let drawn = /** @type {unknown} */ (null);
   let former = /** @type {{source: Source, since: number} | null} */ (null);
 
   const frame = () => Math.floor(position);
   const picture = (/** @type {Source} */ one) => one.at(frame() % one.nFrames);
-  const isAtEnd = () => !loop && position >= source.span - 1;
 
   function step() {
     request = 0;
     const now = clock.now();
     if (isPlaying && !source.isLive) {
-      position += (Math.min(now - last, LONGEST_STEP_MS) / 1000) * source.fps * speed;
-      if (loop) position %= source.span;
-      else position = Math.min(position, source.span - 1);
+      position = (position + (Math.min(now - last, LONGEST_STEP_MS) / 1000) * source.fps) % source.span;
     }
     last = now;
     if (former && now - former.since >= CROSS_FADE_MS) {
@@ -43,7 +42,6 @@ export function createPlayer(drawer, source, { onFrame = () => {}, onState = () 
       shown = -1;
     }
     if (former || source.isLive || frame() !== shown) draw(now);
-    if (isPlaying && isAtEnd()) setPlaying(false);
     ask();
   }
 
@@ -77,20 +75,13 @@ export function createPlayer(drawer, source, { onFrame = () => {}, onState = () 
   const player = {
     get frame() { return frame(); },
     get isPlaying() { return isPlaying; },
-    play() {
-      if (isAtEnd()) position = 0;
-      setPlaying(true);
-    },
+    play: () => setPlaying(true),
     pause: () => setPlaying(false),
     /** Shows a frame of the time line. @param {number} to */
     seek(to) {
       position = Math.min(source.span - 1, Math.max(0, Math.floor(to) || 0));
       ask();
     },
-    /** @param {number} factor 1 is the speed of the film */
-    setSpeed(factor) { speed = Math.max(0, factor) || 0; },
-    /** @param {boolean} next */
-    setLoop(next) { loop = next; },
     /** Cross-fades to another flock. The play head stays where it is. @param {Source} next */
     swap(next) {
       if (shown >= 0) former = { source, since: clock.now() };
@@ -106,9 +97,10 @@ export function createPlayer(drawer, source, { onFrame = () => {}, onState = () 
     },
     /** Stops the loop while nobody sees the canvas. @param {boolean} next */
     setSeen(next) {
+      if (next === isSeen) return;
       isSeen = next;
       last = clock.now();
-      if (!next) clock.cancel(request);
+      clock.cancel(request);
       request = 0;
       ask();
     },
@@ -123,7 +115,7 @@ export function createPlayer(drawer, source, { onFrame = () => {}, onState = () 
  * @param {Element} canvas @param {ReturnType<typeof createPlayer>} player
  */
 export function attach(canvas, player) {
-  const calm = matchMedia("(prefers-reduced-motion: reduce)");
+  const calm = reducedMotion();
   let isOnScreen = true;
   const look = () => player.setSeen(isOnScreen && !document.hidden);
   const obey = () => { if (calm.matches) player.pause(); };

@@ -9,8 +9,8 @@ export const posterOf = (flock) => (flock.params.render?.formats?.includes("post
 
 /** Returns the name of a flock, such as "20 × goldfish". @param {any} flock */
 export async function flockName(flock) {
-  const library = await libraryOf(flock);
-  return say("flock.of", { n: flock.count, film: library ? filmName(library) : say("film.deleted") });
+  const film = await libraryOf(flock).then((library) => (library ? filmName(library) : say("film.deleted")), () => say("film.unnamed"));
+  return say("flock.of", { n: flock.count, film });
 }
 
 /** Returns the card of a flock. @param {any} flock */

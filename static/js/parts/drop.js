@@ -36,10 +36,12 @@ export function startDrop() {
 /** Puts a folder into the tray as refused. @param {string} name */
 const refuseFolder = (name) => tellInTray(name, new Problem({ title: say("drop.folder"), detail: say("drop.folder.detail") }));
 
+let n_told = 0;
+
 /** Shows a problem in the tray. @param {string} name @param {any} problem */
 function tellInTray(name, problem) {
   /** @type {import("../app/upload.js").Upload} */
-  const told = { id: -uploads.value.length - 1, name, address: "", sent: 0, total: 0, state: "failed", problem, cancel: () => uploads.set(uploads.value.filter((other) => other !== told)) };
+  const told = { id: n_told -= 1, name, address: "", sent: 0, total: 0, state: "failed", problem, cancel: () => uploads.set(uploads.value.filter((other) => other !== told)) };
   uploads.set([told, ...uploads.value]);
   openTray();
 }
@@ -59,7 +61,7 @@ export function fileButton(label, { camera = false } = {}) {
  * Sends films and starts their analyses. One film's place is shown once it has arrived; of several, the place
  * of all films. If the person has left the place meanwhile, it is not changed. @param {File[]} files
  */
-export async function measureAll(files) {
+async function measureAll(files) {
   if (!files.length) return;
   openTray();
   const sender = await import("../app/upload.js").catch(() => null);

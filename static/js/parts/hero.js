@@ -1,15 +1,13 @@
 // The stage of Home and of a film: the film of the one animal, and its flock alive beside it.
 // @ts-check
-import { element } from "../app/element.js";
+import { element, releaseVideo } from "../app/element.js";
+import { isCalm } from "../app/motion.js";
 import { filmName } from "../app/names.js";
 import { say, seconds } from "../app/words.js";
 import { living, loadPictures } from "./living.js";
 
 /** Width of the page below which the small sheet of the atlas is sharp enough, pixels. */
 const SMALL_PX = 700;
-
-/** Whether the person wants no motion that begins by itself. */
-export const isCalm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 /** Fills the stage around the picture with its blurred colors. @param {HTMLElement} stage @param {string} src */
 export function setBack(stage, src) {
@@ -40,6 +38,7 @@ export async function showFlock(stage, { library, planning, life, links }) {
   const film = element("video", { src: `${base}/film.mp4`, poster: `${base}/poster.jpg`, muted: true, loop: true, playsInline: true, autoplay: !isCalm(), "aria-label": say("home.film") });
   const one = element("figure.hero-one", {}, film, element("figcaption", {}, say("hero.one", { time: seconds(Math.round(library.n_frames / library.fps)) })));
   film.addEventListener("error", () => one.remove());
+  life.addEventListener("abort", () => releaseVideo(film));
   pause.addEventListener("click", () => {
     if (flock.player.isPlaying) { flock.player.pause(); film.pause(); } else { flock.player.play(); film.play().catch(() => {}); }
   });
@@ -48,6 +47,7 @@ export async function showFlock(stage, { library, planning, life, links }) {
     element("p", {}, say("hero.caption", { n: plan.nIndividuals, film: filmName(library) })),
     element("p.hero-hint", {}, say("hero.chase")),
     element("p.actions", {}, ...links));
+  for (const video of stage.querySelectorAll("video")) releaseVideo(video);
   stage.replaceChildren(one, flock.node, caption);
   flock.node.append(pause);
   setBack(stage, `${base}/poster.jpg`);

@@ -5,10 +5,11 @@
  * Listens for keys until `life` ends. Fields and open dialogs keep their keys, and buttons keep Space.
  * @param {AbortSignal} life @param {Record<string, (event: KeyboardEvent) => void>} acts what each key does, by its
  *   name; letters are small
+ * @param {Element} [own] a field whose keys are these
  */
-export function listenForKeys(life, acts) {
+export function listenForKeys(life, acts, own) {
   document.addEventListener("keydown", (event) => {
-    if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || isTaken(event)) return;
+    if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || (event.target !== own && isTaken(event))) return;
     const act = acts[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!act) return;
     event.preventDefault();
@@ -18,9 +19,9 @@ export function listenForKeys(life, acts) {
 
 /** Returns whether the focused element needs the key itself. @param {KeyboardEvent} event */
 function isTaken({ key, target }) {
-  const node = /** @type {HTMLElement} */ (target);
   if (document.querySelector("dialog[open]")) return true;
-  if (node.matches?.("input:not([type=checkbox]):not([type=radio]), select, textarea")) return true;
-  if (node.matches?.("[role=tab], input[type=radio], .table-room") && (key.startsWith("Arrow") || key === "Home" || key === "End")) return true;
-  return key === " " && Boolean(node.closest?.("button, a, summary, input, [role=button]"));
+  if (!(target instanceof Element)) return false;
+  if (target.matches("input:not([type=checkbox], [type=radio]), select, textarea")) return true;
+  if (target.matches("[role=tab], input[type=radio], .table-scroll, pre") && (key.startsWith("Arrow") || key === "Home" || key === "End")) return true;
+  return key === " " && target.closest("button, a, summary, input, [role=button]") !== null;
 }

@@ -45,15 +45,14 @@ export async function living({ libraryId, plan, life, small = false, pictures = 
   const drawer = await createDrawer(canvas, sceneOf(plan, atlas, picture), { onResize: () => player?.redraw() });
   if (life.aborted) {
     drawer.dispose();
-    atlas.close();
     throw life.reason;
   }
   player = createPlayer(drawer, planSource(plan, atlas), { onFrame, onState });
   const detach = attach(canvas, player);
-  const tell = async () => canvas.setAttribute("aria-label", await sentence(plan, player.frame));
+  const tell = () => sentence(plan, player.frame).then((text) => canvas.setAttribute("aria-label", text), () => {});
   tell();
   const telling = setInterval(tell, DESCRIBE_MS);
-  life.addEventListener("abort", () => { clearInterval(telling); detach(); drawer.dispose(); atlas.close(); });
+  life.addEventListener("abort", () => { clearInterval(telling); detach(); drawer.dispose(); });
   const showSource = (/** @type {any} */ source) => player.swap(source);
   return {
     node: element("div.living", {}, canvas), canvas, player, atlas, showSource,
@@ -68,13 +67,14 @@ export async function living({ libraryId, plan, life, small = false, pictures = 
 }
 
 /**
- * Loads what a living flock is drawn with: the atlas and the background.
+ * Loads what a living flock is drawn with until `life` ends: the atlas and the background.
  * @param {string} libraryId @param {{life: AbortSignal, small?: boolean}} options @returns {Promise<[any, ImageBitmap]>}
  */
 export function loadPictures(libraryId, { life, small = false }) {
   const base = `/v1/libraries/${libraryId}/`;
   const pictures = Promise.all([loadAtlas(base, { small, signal: life }), loadPicture(`${base}background.png`, life)]);
   pictures.catch(() => {});
+  life.addEventListener("abort", () => pictures.then(([atlas, background]) => { atlas.close(); background.close(); }, () => {}));
   return pictures;
 }
 

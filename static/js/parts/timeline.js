@@ -2,6 +2,7 @@
 // @ts-check
 import { element, svg } from "../app/element.js";
 import { clock, count, say } from "../app/words.js";
+import { listenForKeys } from "./keys.js";
 
 /** Frames of a step with Shift. */
 const FAR = 10;
@@ -9,9 +10,6 @@ const FAR = 10;
 const POINTS = 240;
 /** Rows of the strip's table. */
 const ROWS = 12;
-
-/** Returns whether a key belongs to the focused element. @param {EventTarget | null} target */
-const takesKeys = (target) => target instanceof Element && target.closest("input, select, textarea, button, summary, a, pre, .table-room, [contenteditable], [role=tab]") !== null;
 
 /**
  * @typedef {{node: HTMLElement, setFrame: (frame: number) => void, setPlaying: (isPlaying: boolean) => void,
@@ -60,18 +58,14 @@ export function timeline({ life, seek, toggle, onScrub = () => {} }) {
     const box = strip.getBoundingClientRect();
     scrub(Math.round(((event.clientX - box.left) / box.width) * (n_frames - 1)));
   });
-  addEventListener("keydown", (event) => {
-    const inRange = event.target === range;
-    if (event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey || (!inRange && takesKeys(event.target))) return;
-    const far = event.shiftKey ? FAR : 1;
-    if (event.key === " ") toggle();
-    else if (event.key === "ArrowLeft") scrub(frame - far);
-    else if (event.key === "ArrowRight") scrub(frame + far);
-    else if (event.key === "Home") scrub(0);
-    else if (event.key === "End") scrub(n_frames - 1);
-    else return;
-    event.preventDefault();
-  }, { signal: life });
+  const far = (/** @type {KeyboardEvent} */ { shiftKey }) => (shiftKey ? FAR : 1);
+  listenForKeys(life, {
+    " ": toggle,
+    ArrowLeft: (event) => scrub(frame - far(event)),
+    ArrowRight: (event) => scrub(frame + far(event)),
+    Home: () => scrub(0),
+    End: () => scrub(n_frames - 1),
+  }, range);
 
   /** @param {boolean} isPlaying */
   function setPlaying(isPlaying) {

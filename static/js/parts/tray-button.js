@@ -25,7 +25,7 @@ export function startTray() {
   };
   jobs.watch(draw);
   uploads.watch(draw);
-  if (Object.keys(localStorage).some((key) => key.startsWith("tus::"))) import("../app/upload.js").then(({ tellInterrupted }) => tellInterrupted());
+  if (Object.keys(localStorage).some((key) => key.startsWith("tus::"))) import("../app/upload.js").then(({ tellInterrupted }) => tellInterrupted(), () => {});
   let isFilled = false;
   byId("tray").addEventListener("beforetoggle", async (/** @type {ToggleEvent} */ event) => {
     if (event.newState !== "open" || isFilled) return;

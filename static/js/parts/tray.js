@@ -1,15 +1,18 @@
 // The tray of jobs: what runs, how far it is, and buttons to cancel, open, mend or retry.
 // @ts-check
 import { byId, element } from "../app/element.js";
-import { addressOf, cancel, isUnderWay, jobs, uploads } from "../app/jobs.js";
+import { addressOf, aheadOf, cancel, isUnderWay, jobs, resultOf, retry, uploads } from "../app/jobs.js";
 import { subjectOf } from "../app/names.js";
 import { ago, percent, say, size, stageOf } from "../app/words.js";
 import { fileButton, measure } from "./drop.js";
+import { filmButtons } from "./film-buttons.js";
 import { mendsOf } from "./mend.js";
 import { problemBox } from "./problem.js";
 
 /** Number of ended jobs in the tray; the place of all jobs shows more. */
 const ENDED = 4;
+/** Share of a job and time since its start after which its time left can be told, and the least share that is not all start-up. */
+const [TOLD_SHARE, TOLD_S, LEAST_SHARE] = [0.2, 5, 0.05];
 
 /** Fills the tray and keeps it up to date. */
 export function fillTray() {
@@ -21,9 +24,8 @@ export function fillTray() {
   tray.addEventListener("click", (/** @type {any} */ event) => { if (event.target.closest("a[href]")) tray.hidePopover(); });
   const draw = () => {
     const running = jobs.value.filter(isUnderWay);
-    const sending = uploads.value.filter((one) => one.state !== "done");
     const shown = [...running, ...jobs.value.filter((job) => !isUnderWay(job)).slice(0, ENDED)];
-    reconcile(list, [...sending.map((one) => ({ key: `upload-${one.id}`, draw: uploadCard, of: one })), ...shown.map((job) => ({ key: job.id, draw: jobCard, of: job }))]);
+    reconcile(list, [...uploads.value.map((one) => ({ key: `upload-${one.id}`, draw: uploadCard, of: one })), ...shown.map((job) => ({ key: job.id, draw: jobCard, of: job }))]);
     if (!list.childElementCount) list.append(element("p.soft", {}, say("tray.empty")));
   };
   jobs.watch(draw);
@@ -54,28 +56,30 @@ export function jobCard(job) {
   const problem = element("div");
   const thumb = element("img.job-thumb", { alt: "", width: 64, height: 48, hidden: true });
   const card = element("article.job", {}, thumb, element("div.job-body", {}, element("div.job-line", {}, name, stage), bar, more, problem, actions));
-  let drawn = "";
+  let [drawn, isNamed] = ["", true];
   const tellSubject = async (/** @type {any} */ seen) => {
-    const film = await subjectOf(seen);
+    // Without an answer of the service, it is asked again at the next change.
+    const film = await subjectOf(seen).catch(() => ({ name: say("film.unnamed"), poster: "", isGone: false, isUnknown: true }));
+    isNamed = !("isUnknown" in film);
     name.textContent = say(`job.${job.kind}`, { film: film.name });
     thumb.hidden = !film.poster;
     if (film.poster) thumb.src = film.poster;
-    if (drawn.startsWith(seen.state)) actions.replaceChildren(...buttonsOf(seen, film));
+    if (drawn.startsWith(seen.state) && !isUnderWay(seen)) actions.replaceChildren(...buttonsOf(seen, film));
   };
   card.update = (/** @type {any} */ seen) => {
     bar.value = seen.progress ?? 0;
     bar.hidden = !isUnderWay(seen);
     stage.textContent = seen.state === "running" ? `${stageOf(seen)} · ${percent(seen.progress ?? 0)}` : stageOf(seen);
-    more.textContent = isUnderWay(seen) ? [leftText(seen), seen.attempt > 1 ? say("job.restarted", { n: seen.attempt }) : ""].filter(Boolean).join(" ") : ago(seen.finished_at ?? seen.created_at);
+    more.textContent = isUnderWay(seen) ? [aheadText(seen), leftText(seen), seen.attempt > 1 ? say("job.restarted", { n: seen.attempt }) : ""].filter(Boolean).join(" ") : ago(seen.finished_at ?? seen.created_at);
     more.hidden = !more.textContent;
     const state = `${seen.state} ${seen.cancel_requested}`;
-    if (state === drawn) return;
+    if (state === drawn) return isNamed ? undefined : void tellSubject(seen);
     drawn = state;
     card.dataset.state = seen.state;
     const mends = seen.kind === "analysis" ? mendsOf(seen.error ?? {}, (params) => measure(seen.subject.id, params, { show: true })) : [];
     problem.replaceChildren(...(seen.state === "failed" ? [problemBox(seen.error ?? {}, mends)] : []));
     actions.replaceChildren(...buttonsOf(seen));
-    tellSubject(seen);
+    return void tellSubject(seen);
   };
   return card;
 }
@@ -83,19 +87,30 @@ export function jobCard(job) {
 /** @param {any} job @param {{isGone: boolean}} [film] what the job works on, once it is known */
 function buttonsOf(job, film) {
   if (isUnderWay(job)) {
-    const stop = (/** @type {any} */ event) => { event.target.disabled = true; cancel(job.id).catch(() => { event.target.disabled = false; }); };
-    return [element("button.quiet", { type: "button", disabled: job.cancel_requested, onclick: stop }, say("cancel"))];
+    return [element("button.quiet", { type: "button", disabled: job.cancel_requested, onclick: once(() => cancel(job.id)) }, say("cancel"))];
   }
   if (!film || film.isGone) return [];
-  if (job.state === "done") return job.kind === "sample" ? [] : [element("a.button.quiet", { href: addressOf(job) }, say("job.open"))];
-  if (job.kind === "analysis") return [element("button.quiet", { type: "button", onclick: () => measure(job.subject.id, {}, { show: true }) }, say("job.again")), element("a.button.quiet", { href: `/films/${job.subject.id}` }, say("job.film"))];
-  return job.kind === "flock" ? [element("a.button.quiet", { href: `/libraries/${job.subject.id}/studio` }, say("film.studio"))] : [];
+  if (job.state === "done") return job.kind === "sample" ? [] : [element("a.button.quiet", { href: addressOf(job) }, say("job.open")), ...(job.kind === "flock" ? filmButtons(resultOf(job)) : [])];
+  const again = job.retriable ? [element("button.quiet", { type: "button", onclick: once(() => retry(job.id)) }, say("job.retry"))] : [];
+  if (job.kind === "analysis") return [...(again.length ? again : [element("button.quiet", { type: "button", onclick: () => measure(job.subject.id, {}, { show: true }) }, say("job.again"))]), element("a.button.quiet", { href: `/films/${job.subject.id}` }, say("job.film"))];
+  return job.kind === "flock" ? [...again, element("a.button.quiet", { href: `/libraries/${job.subject.id}/studio` }, say("reels.studio"))] : again;
 }
 
+/** Returns how many jobs come before a job that waits. @param {any} job */
+function aheadText(job) {
+  const n = job.state === "queued" ? aheadOf(job) : 0;
+  return n ? say("job.ahead", { n }) : "";
+}
+
+/** Returns a handler of clicks that disables its button, unless the request fails. @param {() => Promise<any>} request */
+const once = (request) => (/** @type {any} */ event) => { event.target.disabled = true; request().catch(() => { event.target.disabled = false; }); };
+
 /** Returns the time left as text, estimated from the progress since the job began. @param {any} job */
-export function leftText(job) {
+function leftText(job) {
   const elapsed_s = (Date.now() - Date.parse(job.started_at ?? "")) / 1000;
-  if (job.state !== "running" || !(job.progress > 0.05) || !(elapsed_s > 2)) return "";
+  const isKnown = job.progress >= LEAST_SHARE && (job.progress >= TOLD_SHARE || elapsed_s >= TOLD_S);
+  // The start of a job is that of its first attempt.
+  if (job.state !== "running" || job.attempt > 1 || !isKnown) return "";
   const left_s = Math.max(1, elapsed_s / job.progress - elapsed_s);
   return say("job.left", { time: left_s < 90 ? say("unit.seconds", { n: Math.round(left_s) }) : say("unit.minutes", { n: Math.round(left_s / 60) }) });
 }

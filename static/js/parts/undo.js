@@ -1,4 +1,5 @@
-// Deleting with a way back: the thing vanishes at once, and is deleted when the time to undo is over.
+// Deletions that can be undone: the thing vanishes from the page at once. The service deletes it when the time to
+// undo is over.
 // @ts-check
 import { remove } from "../app/api.js";
 import { element } from "../app/element.js";
@@ -7,7 +8,7 @@ import { signal } from "../app/store.js";
 import { say } from "../app/words.js";
 
 /** Time in which a deletion can be undone, ms. */
-export const UNDO_MS = 10_000;
+const UNDO_MS = 10_000;
 
 /** Ids of things that are deleted or about to be. Lists leave them out. @type {import("../app/store.js").Signal<Set<string>>} */
 export const deleted = signal(new Set());
@@ -50,16 +51,14 @@ export function deleteLater({ id, path, name }) {
   async function finish() {
     if (!waiting.delete(path)) return;
     try {
-      await remove(path);
+      await remove(path).catch((problem) => { if (problem.status !== 404) throw problem; });
       forget(path);
       close();
     } catch (problem) {
-      if (/** @type {any} */ (problem).status === 404) return close();
       mark(id, false);
       text.textContent = say("undo.failed", { name, reason: /** @type {any} */ (problem).message });
       button.replaceWith(element("button", { type: "button", onclick: close }, say("dismiss")));
     }
-    return undefined;
   }
   function close() {
     const hadFocus = note.contains(document.activeElement);
@@ -75,4 +74,6 @@ function deleteWaiting() {
     fetch(path, { method: "DELETE", keepalive: true }).catch(() => {});
   }
   waiting.clear();
+  // A browser may show the page again as it was.
+  notes?.replaceChildren();
 }

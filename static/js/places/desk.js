@@ -32,7 +32,7 @@ export async function show(root, { id, query, life }) {
   setTitle(say("desk.title", { film: filmName(library) }));
   const desk = createInstrument(library, Number(query.get("t")) || 0, life);
   const player = createPlayer(desk);
-  const pictures = createPictures(desk, { library });
+  const pictures = createPictures(desk);
   const shoot = createShots(desk);
   const nextJump = jumpPlayer(desk, player);
   const stage = createStage(desk, { player, pictures });
@@ -49,7 +49,7 @@ export async function show(root, { id, query, life }) {
 
   root.append(
     element("header.place-head", {}, element("h1", { tabIndex: -1 }, filmName(library)),
-      element("p.actions", {}, element("a.button", { href: `/libraries/${id}/studio` }, say("desk.studio")), element("a.button.quiet", { href: `/libraries/${id}/fish` }, say("desk.fish")), element("a.button.quiet", { href: `/films/${library.footage_id}` }, say("desk.the_film")), element("button.quiet#measure-again", { type: "button", onclick: () => remeasure("", {}) }, say("remeasure.title")))),
+      element("p.actions", {}, element("a.button", { href: `/libraries/${id}/studio` }, say("film.studio")), element("a.button.quiet", { href: `/libraries/${id}/fish` }, say("desk.fish")), element("a.button.quiet", { href: `/films/${library.footage_id}` }, say("desk.the_film")), element("button.quiet#measure-again", { type: "button", onclick: () => remeasure("", {}) }, say("remeasure.title")))),
     failure,
     element("div.desk-pair", {},
       element("section.desk-film", { "aria-label": say("desk.film") }, stage.node, stage.controls, transport.node, transport.reading),

@@ -1,15 +1,16 @@
 // The place of one film: it plays while it is measured. When the analysis is done, its flock swims here.
 // @ts-check
 import { get, list } from "../app/api.js";
-import { element } from "../app/element.js";
-import { ended, isUnderWay, jobs, ready, resultOf } from "../app/jobs.js";
+import { element, releaseVideo } from "../app/element.js";
+import { ended, isUnderWay, jobs, resultOf, whenReady } from "../app/jobs.js";
+import { isCalm } from "../app/motion.js";
 import { filmName } from "../app/names.js";
 import { go, setTitle } from "../app/router.js";
 import { sent } from "../app/upload.js";
 import { count, say, seconds } from "../app/words.js";
 import { filmPicture } from "../parts/cards.js";
 import { measure } from "../parts/drop.js";
-import { isCalm, showFlock } from "../parts/hero.js";
+import { showFlock } from "../parts/hero.js";
 import { preview } from "../parts/living.js";
 import { mendsOf } from "../parts/mend.js";
 import { problemBox, showProblem } from "../parts/problem.js";
@@ -28,34 +29,37 @@ export async function show(root, { id, life, state }) {
   setTitle(name);
   const stage = element("section.hero", { "aria-label": say("home.film") });
   const status = element("div.status", { "aria-live": "polite" });
-  const drop = element("button.quiet.small", { type: "button", onclick: () => { deleteLater({ id, path: `/v1/footage/${id}`, name }); go("/films"); } }, say("film.delete"));
+  const drop = element("button.quiet.small", { type: "button", onclick: discard }, say("film.delete"));
   root.append(element("header.place-head", {}, element("div", {}, element("h1", { tabIndex: -1 }, name),
     element("p.soft", {}, [seconds(film.n_frames_hint / film.fps), film.image_size_px.join(" × "), say("unit.fps", { n: count(film.fps) })].join(" · "))),
   element("p.actions", {}, drop)), stage, status);
   const parts = { film, stage, status, life };
-  await loaded(life);
+  await whenReady(life);
   const job = await jobOf(id, state?.job, life);
   // The place is shown now: the router need not wait for the end of the job to set the focus.
   if (job) return void follow(job, parts);
   const [library] = (await list(`/v1/libraries?footage_id=${id}&limit=1`, life)).items;
   if (library) return showMeasured(library.id, parts, state?.isKnown ? say("film.known") : "");
   showFilm(parts);
-  return offer(parts, say("film.not_measured"));
-}
+  return void offer(parts, say("film.not_measured"));
 
-/** Waits until the jobs are known. @param {AbortSignal} life @returns {Promise<void>} */
-const loaded = (life) => new Promise((resolve) => ready.watch((isReady) => { if (isReady) resolve(); }, life));
+  async function discard() {
+    const undo = deleteLater({ id, path: `/v1/footage/${id}`, name });
+    await go("/films");
+    undo.focus();
+  }
+}
 
 /** Returns the newest analysis of a film if it is under way or failed, or the given one. @param {string} id @param {string | undefined} jobId @param {AbortSignal} life */
 async function jobOf(id, jobId, life) {
   const mine = jobs.value.filter((job) => job.kind === "analysis" && job.subject?.id === id);
   const newest = mine.find(isUnderWay) ?? mine[0];
   if (newest) return newest.state === "done" || newest.state === "cancelled" ? null : newest;
-  return jobId ? get(`/v1/jobs/${jobId}`, life).catch(() => null) : null;
+  return jobId ? get(`/v1/jobs/${jobId}`, life).catch((problem) => { if (problem.status !== 404) throw problem; return null; }) : null;
 }
 
 /** Plays the film as it was sent, if this browser can. @param {Parts} parts */
-function showFilm({ film, stage }) {
+function showFilm({ film, stage, life }) {
   const video = element("video", { src: sent.get(film.id) ?? `/v1/footage/${film.id}/file`, muted: true, loop: true, playsInline: true, controls: true, autoplay: !isCalm(), "aria-label": say("home.film") });
   video.addEventListener("error", () => video.replaceWith(element("p.hero-note", {}, filmPicture(film), say("film.unplayable"))));
   video.style.setProperty("--ratio", String(film.image_size_px[0] / film.image_size_px[1]));
@@ -63,6 +67,7 @@ function showFilm({ film, stage }) {
   const back = element("video.hero-back", { src: `${video.src}#t=0.1`, muted: true, preload: "metadata", tabIndex: -1, "aria-hidden": "true" });
   back.addEventListener("error", () => back.remove());
   stage.replaceChildren(back, video);
+  life.addEventListener("abort", () => [back, video].forEach(releaseVideo));
 }
 
 /** Offers to measure the film. @param {Parts} parts @param {string} sentence */
@@ -78,7 +83,7 @@ async function follow(job, parts) {
   showFilm(parts);
   const card = jobCard(job);
   card.update(job);
-  status.replaceChildren(card);
+  status.replaceChildren(element("p", {}, say("film.wait")), card);
   try {
     const done = await ended(job.id, life, card.update);
     await showMeasured(resultOf(done), parts);
@@ -101,11 +106,14 @@ async function showMeasured(libraryId, parts, note = "") {
     const planning = preview(libraryId, FIRST, life);
     planning.catch(() => {});
     const library = await get(`/v1/libraries/${libraryId}`, life);
-    const links = [element("a.button", { href: `/libraries/${libraryId}/studio` }, say("film.studio")), element("a.button.quiet", { href: `/libraries/${libraryId}` }, say("film.desk"))];
+    const studio = element("a.button", { href: `/libraries/${libraryId}/studio` }, say("film.studio"));
+    const links = [studio, element("a.button.quiet", { href: `/libraries/${libraryId}` }, say("film.desk"))];
     await showFlock(stage, { library, planning, life, links });
     const again = element("button.quiet", { type: "button", onclick: () => measure(film.id, {}, { show: true }) }, say("job.again"));
     const fish = element("a.button.quiet", { href: `/libraries/${libraryId}/fish` }, say("desk.fish"));
-    status.replaceChildren(element("p", {}, note || say("film.swims")), element("p.actions", {}, fish, again));
+    const hadFocus = status.contains(document.activeElement);
+    status.replaceChildren(element("p", {}, note || say("film.flock"), " ", say("film.next")), element("p.actions", {}, fish, again));
+    if (hadFocus) studio.focus({ preventScroll: true });
   } catch (problem) {
     if (life.aborted) return;
     showFilm(parts);

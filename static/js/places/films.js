@@ -8,13 +8,14 @@ import { setTitle } from "../app/router.js";
 import { percent, say, stageOf } from "../app/words.js";
 import { filmCard } from "../parts/cards.js";
 import { fileButton } from "../parts/drop.js";
+import { pinButton, spaceSentence } from "../parts/pin.js";
 import { problemBox } from "../parts/problem.js";
 import { deleted, deleteLater } from "../parts/undo.js";
 
 /** Films of a page. */
 const PAGE = 30;
 
-/** @typedef {{film: any, node: HTMLElement, state: HTMLElement}} Entry */
+/** @typedef {{film: any, library: any, node: HTMLElement, state: HTMLElement}} Entry library: the newest one of the film */
 
 /** @param {HTMLElement} root @param {import("../app/router.js").Visit} visit */
 export async function show(root, { life }) {
@@ -25,23 +26,28 @@ export async function show(root, { life }) {
   const empty = element("div.empty", { hidden: true }, element("p", {}, say("films.empty")), element("p.actions", {}, fileButton(say("home.choose"))));
   const found = element("p.soft", { role: "status" });
   const trouble = element("div");
+  const space = element("p.soft.narrow");
   root.append(element("header.place-head", {}, element("h1", { tabIndex: -1 }, say("films.title")), element("div.actions", {}, search, fileButton(say("home.choose")))),
-    element("p.soft.narrow", {}, say("films.help")), found, trouble, empty, cards, element("p", {}, more));
+    element("p.soft.narrow", {}, say("films.help")), space, found, trouble, empty, cards, element("p", {}, more));
   /** @type {Entry[]} */
   let all = [];
-  /** @type {any[]} */
-  let libraries = [];
   /** @type {string | null} */
   let next = `/v1/footage?limit=${PAGE}`;
   const tell = (/** @type {any} */ problem) => { if (!life.aborted) trouble.replaceChildren(problemBox(problem)); };
 
-  /** @param {any} film @returns {Entry} */
-  const entry = (film) => {
+  /** @param {any} film @returns {Promise<Entry>} */
+  const entry = async (film) => {
+    const [library] = (await list(`/v1/libraries?footage_id=${film.id}&limit=1`, life)).items;
     const state = element("p.film-state");
     const name = filmName(film);
     const drop = element("button.quiet.small", { type: "button", "aria-label": say("reels.delete.of", { name }), onclick: () => deleteLater({ id: film.id, path: `/v1/footage/${film.id}`, name }).focus() }, say("film.delete"));
-    const node = filmCard(film, { library: libraries.find((library) => library.footage_id === film.id), state: element("div.film-foot", {}, state, drop) });
-    return { film, node, state };
+    const pin = pinButton({ path: `/v1/footage/${film.id}`, isPinned: film.pinned, name }, tell);
+    return { film, library, node: filmCard(film, { library, state: element("div.film-foot", {}, state, pin, drop) }), state };
+  };
+  /** Makes the entries of films that are not shown yet. @param {any[]} films */
+  const entriesOf = async (films) => {
+    const made = await Promise.all(films.filter((film) => !all.some((one) => one.film.id === film.id)).map(entry));
+    return made.filter(({ film }) => !all.some((one) => one.film.id === film.id));
   };
   const sift = () => {
     const wanted = search.value.trim().toLocaleLowerCase();
@@ -54,48 +60,55 @@ export async function show(root, { life }) {
     empty.hidden = Boolean(wanted || kept.length || next);
     search.hidden = all.length < 2;
   };
-  /** Shows the state of each film that is newer than its card. */
   const tellStates = () => {
-    for (const { film, state, node } of all) {
+    for (const { film, library, state, node } of all) {
       const mine = jobs.value.filter((job) => job.kind === "analysis" && job.subject?.id === film.id);
       const job = mine.find(isUnderWay) ?? mine[0];
-      const isMeasured = libraries.some((library) => library.footage_id === film.id);
-      node.dataset.state = job && isUnderWay(job) ? "running" : isMeasured ? "measured" : job?.state === "failed" ? "refused" : "bare";
-      state.textContent = job && isUnderWay(job) ? `${stageOf(job)} · ${percent(job.progress ?? 0)}` : isMeasured ? say("film.measured") : job?.state === "failed" ? job.error?.title ?? say("state.failed") : say("film.not_measured");
+      node.dataset.state = job && isUnderWay(job) ? "running" : library ? "measured" : job?.state === "failed" ? "refused" : "bare";
+      state.textContent = job && isUnderWay(job) ? `${stageOf(job)} · ${percent(job.progress ?? 0)}` : library ? say("film.measured") : job?.state === "failed" ? job.error?.title ?? say("state.failed") : say("film.not_measured");
     }
   };
   const fill = async () => {
     if (!next) return;
-    const [page, measured] = await Promise.all([list(next, life), list("/v1/libraries?limit=100", life)]);
-    libraries = measured.items;
-    const made = page.items.filter((film) => !all.some((one) => one.film.id === film.id)).map(entry);
+    const page = await list(next, life);
+    const made = await entriesOf(page.items);
     all.push(...made);
     cards.append(...made.map(({ node }) => node));
     next = page.next;
     sift();
     tellStates();
   };
-  /** Shows films and measurements that came meanwhile. */
-  const refresh = async () => {
-    const [page, measured] = await Promise.all([list(`/v1/footage?limit=${PAGE}`, life), list("/v1/libraries?limit=100", life)]);
-    const fresh = measured.items.filter((library) => !libraries.some((one) => one.id === library.id)).map((library) => library.footage_id);
-    libraries = measured.items;
-    const isOld = (/** @type {Entry} */ one) => fresh.includes(one.film.id);
-    all = all.map((one) => { if (!isOld(one)) return one; const next = entry(one.film); one.node.replaceWith(next.node); return next; });
-    const made = page.items.filter((film) => !all.some((one) => one.film.id === film.id)).map(entry);
+  /** Shows films that came meanwhile, and the measurements of others. @param {Set<string>} measured ids of films */
+  const refresh = async (measured) => {
+    const again = await Promise.all(all.filter(({ film }) => measured.has(film.id)).map(({ film }) => entry(film)));
+    for (const one of again) {
+      const idx = all.findIndex(({ film }) => film.id === one.film.id);
+      all[idx].node.replaceWith(one.node);
+      all[idx] = one;
+    }
+    const made = await entriesOf((await list(`/v1/footage?limit=${PAGE}`, life)).items);
     all.unshift(...made);
     cards.prepend(...made.map(({ node }) => node));
     sift();
     tellStates();
   };
   deleted.watch(sift, life);
+  const tellSpace = () => spaceSentence(life).then((sentence) => { space.textContent = sentence; }).catch(() => {});
+  tellSpace();
   await fill();
-  let known = "";
+  /** Jobs and their states that the cards show. */
+  let known = new Set(jobs.value.map(stateKey));
   jobs.watch((every) => {
     tellStates();
     // A new job may be of a new film, a done one makes a library.
-    const now = every.filter((job) => job.kind !== "flock").map((job) => job.id + (job.state === "done")).join();
-    if (known && now !== known) refresh().catch(() => {});
-    known = now || "none";
+    const fresh = every.filter((job) => job.kind !== "flock" && !known.has(stateKey(job)));
+    known = new Set(every.map(stateKey));
+    if (fresh.length) {
+      refresh(new Set(fresh.map((job) => job.subject?.id))).catch(() => {});
+      tellSpace();
+    }
   }, life);
 }
+
+/** @param {any} job */
+const stateKey = (job) => `${job.id} ${job.state === "done"}`;

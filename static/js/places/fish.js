@@ -11,8 +11,6 @@ import { maker, optionsBox } from "../fish/options.js";
 import { createPair } from "../fish/pair.js";
 import { fishOf, versionTable } from "../fish/versions.js";
 import { problemBox, showProblem } from "../parts/problem.js";
-
-
 /** @param {HTMLElement} root @param {import("../app/router.js").Visit} visit */
 export async function show(root, { id, query, life }) {
   const [library, all] = await Promise.all([get(`/v1/libraries/${encodeURIComponent(id)}`, life), fishOf(id, life)]);

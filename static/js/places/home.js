@@ -1,13 +1,14 @@
 // Home: the newest flock alive on a canvas, the film that it came from, and the way to an own one.
 // @ts-check
 import { list } from "../app/api.js";
-import { element } from "../app/element.js";
+import { element, releaseVideo } from "../app/element.js";
 import { isUnderWay, jobs, ready } from "../app/jobs.js";
+import { isCalm } from "../app/motion.js";
 import { remember, thing } from "../app/names.js";
 import { setTitle } from "../app/router.js";
 import { say } from "../app/words.js";
 import { fileButton } from "../parts/drop.js";
-import { isCalm, setBack, showFlock } from "../parts/hero.js";
+import { setBack, showFlock } from "../parts/hero.js";
 import { planOf, preview } from "../parts/living.js";
 
 /** Length of the flock of a library that has none yet, and number of recent cards. */
@@ -31,14 +32,13 @@ export async function show(root, { life }) {
   life.addEventListener("abort", () => shownLife.abort());
 
   const fill = async () => {
-    const [flocks, libraries] = await Promise.all([list(`/v1/flocks?limit=${RECENT}`, life), list("/v1/libraries?limit=100", life)]);
+    const [flocks, libraries] = await Promise.all([list(`/v1/flocks?limit=${RECENT}`, life), list(`/v1/libraries?limit=${RECENT}`, life)]);
     remember("libraries", libraries.items);
     const newest = newestOf(flocks.items[0], libraries.items[0]);
-    if (newest.key === shown) await null;
-    else if (!newest.key) {
+    if (!newest.key && shown !== "") {
       shown = "";
       hear(jobs.value);
-    } else {
+    } else if (newest.key !== shown) {
       shown = newest.key;
       shownLife.abort();
       shownLife = new AbortController();
@@ -51,7 +51,7 @@ export async function show(root, { life }) {
   const hear = (/** @type {any[]} */ all) => {
     if (!ready.value) return;
     const running = all.filter(isUnderWay);
-    if (shown === "") showWaiting(stage, running).catch(() => {});
+    if (shown === "") showWaiting(stage, running, life).catch(() => {});
     const done = all.filter((job) => job.state === "done").length;
     if (done === n_done) return;
     n_done = done;
@@ -67,8 +67,8 @@ function newestOf(flock, library) {
   return { key: flock?.id ?? "", libraryId: flock?.library_id ?? "", flock };
 }
 
-/** Shows the first jobs of an empty service, or what to do. @param {HTMLElement} stage @param {any[]} running */
-async function showWaiting(stage, running) {
+/** Shows the first jobs of an empty service, or what to do. @param {HTMLElement} stage @param {any[]} running @param {AbortSignal} life */
+async function showWaiting(stage, running, life) {
   if (!running.length) return showEmpty(stage);
   const { jobCard, reconcile } = await import("../parts/tray.js");
   if (stage.classList.contains("alive")) return undefined;
@@ -81,7 +81,7 @@ async function showWaiting(stage, running) {
   const chain = [...running].reverse().slice(0, 3);
   // The film under measurement plays behind, as soon as it exists.
   const measured = chain.find((job) => job.kind === "analysis");
-  if (measured?.state === "running" && !stage.querySelector(".hero-behind")) stage.prepend(filmBehind(measured.subject.id));
+  if (measured?.state === "running" && !stage.querySelector(".hero-behind")) stage.prepend(filmBehind(measured.subject.id, life));
   reconcile(cards, chain.map((job) => ({ key: job.id, draw: jobCard, of: job })));
   return undefined;
 }
@@ -94,10 +94,11 @@ function showEmpty(stage) {
     isRefused && element("p.actions", {}, element("a.button.quiet", { href: `/films/${newest.subject.id}` }, say("job.film")))));
 }
 
-/** @param {string} footageId */
-function filmBehind(footageId) {
+/** @param {string} footageId @param {AbortSignal} life */
+function filmBehind(footageId, life) {
   const film = element("video.hero-behind", { src: `/v1/footage/${footageId}/file`, muted: true, loop: true, playsInline: true, autoplay: !isCalm(), "aria-label": say("home.film") });
   film.addEventListener("error", () => film.remove());
+  life.addEventListener("abort", () => releaseVideo(film));
   return film;
 }
 
@@ -106,6 +107,7 @@ async function enliven(stage, { libraryId, flock }, life) {
   const planning = flock ? planOf(flock.id, life) : preview(libraryId, FIRST, life);
   planning.catch(() => {});
   const library = await thing("libraries", libraryId);
+  life.throwIfAborted();
   if (!stage.classList.contains("alive")) {
     setBack(stage, `/v1/libraries/${libraryId}/poster.jpg`);
     stage.querySelector(".hero-wait, .hero-note")?.remove();

@@ -7,6 +7,7 @@ import { filmName, thing } from "../app/names.js";
 import { go, replaceAddress, setTitle } from "../app/router.js";
 import { ago, say, sayOr, seconds, size as bytesOf } from "../app/words.js";
 import { flockName, posterOf } from "../parts/cards.js";
+import { linkButton } from "../parts/film-buttons.js";
 import { planOf } from "../parts/living.js";
 import { problemBox } from "../parts/problem.js";
 import { timeline } from "../parts/timeline.js";
@@ -30,6 +31,7 @@ const IN_FACTS = ["little_room"];
 export async function show(root, { id, query, life }) {
   const flock = await get(`/v1/flocks/${encodeURIComponent(id)}`, life);
   const [name, library] = await Promise.all([flockName(flock), thing("libraries", flock.library_id).catch(() => null)]);
+  life.throwIfAborted();
   setTitle(name);
   const size = flock.params.render?.size_px ?? flock.image_size_px;
   const last = flock.frames - 1;
@@ -91,7 +93,7 @@ export async function show(root, { id, query, life }) {
   const ways = share(library ?? { id: flock.library_id });
   const strip = element("div");
   root.append(
-    element("header.place-head", {}, element("div", {}, element("h1", { tabIndex: -1 }, name), element("p.soft", {}, factsOf(flock, size))), element("p.actions", {}, studio, drop)),
+    element("header.place-head", {}, element("div", {}, element("h1", { tabIndex: -1 }, name), element("p.soft", {}, factsOf(flock, size))), element("p.actions", {}, studio, ...linkButton(flock.id), drop)),
     element("section.reel-view", { "aria-label": say("reel.watch") }, views.stage,
       element("div.stage-controls", {}, choices, truth?.choices, wholeScreen(views.stage, life)), time.node, strip, askedPart.node, trouble, truth?.table),
     facts.node,

@@ -6,6 +6,7 @@ import { isUnderWay, jobs } from "../app/jobs.js";
 import { replaceAddress, setTitle } from "../app/router.js";
 import { say } from "../app/words.js";
 import { flockCard, flockName } from "../parts/cards.js";
+import { pinButton } from "../parts/pin.js";
 import { problemBox } from "../parts/problem.js";
 import { jobCard, reconcile } from "../parts/tray.js";
 import { deleted, deleteLater } from "../parts/undo.js";
@@ -64,7 +65,8 @@ export async function show(root, { query, life }) {
     const studio = element("a.button.quiet", { href: `/libraries/${flock.library_id}/studio`, "aria-label": say("reels.studio.of", { name }) }, say("reels.studio"));
     fields.then((known) => { studio.href = studioAddress(flock, known); }).catch(() => {});
     const drop = element("button.quiet", { type: "button", "aria-label": say("reels.delete.of", { name }), onclick: () => deleteLater({ id: flock.id, path: `/v1/flocks/${flock.id}`, name }).focus() }, say("reel.delete"));
-    node.append(element("p.actions", {}, studio, drop));
+    const pin = pinButton({ path: `/v1/flocks/${flock.id}`, isPinned: flock.pinned, name }, tell);
+    node.append(element("p.actions", {}, studio, pin, drop));
     return { id: flock.id, name: name.toLocaleLowerCase(), node };
   };
   /** Shows the cards that fit the search. */
@@ -75,8 +77,9 @@ export async function show(root, { query, life }) {
     more.hidden = !next;
     found.textContent = wanted() ? say("reels.found", { n: fit.length, query: search.value.trim() }) : "";
     empty.hidden = Boolean(wanted() || kept.length || next);
+    search.hidden = !wanted() && !kept.length && !next;
   };
-  /** The service cannot search, so all pages are loaded. */
+  /** The service searches the names of files, a person the names on the cards: all pages are loaded. */
   const searchAll = async () => {
     while (next && wanted() && !life.aborted) await fill(SEARCHED);
   };

@@ -2,6 +2,7 @@
 // @ts-check
 import { unreachable } from "../app/api.js";
 import { element } from "../app/element.js";
+import { isCalm } from "../app/motion.js";
 import { replaceAddress, setTitle } from "../app/router.js";
 import { day, say, seconds } from "../app/words.js";
 import { decodePlan } from "../flock/plan.js";
@@ -43,12 +44,12 @@ export async function show(root, { id, query, life }) {
   time.setSpan(plan.nFrames, plan.fps);
   onFrame(startFrame ?? 0);
   if (startFrame !== null) shot.seek(startFrame);
-  else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) shot.play();
+  else if (!isCalm()) shot.play();
   const facts = factsBox();
   facts.update(plan);
   root.append(
     element("header.place-head", {}, element("div", {}, element("h1", { tabIndex: -1 }, name), element("p.soft", {}, [seconds(plan.nFrames / plan.fps), size.join(" × "), say("reel.link.until", { time: day(new Date(link.expires_s * 1000).toISOString()) })].join(" · "))),
-      element("p.actions", {}, element("a.button.quiet", { href: source, download: "flock.mp4" }, say("shared.save")))),
+      element("p.actions", {}, element("a.button.quiet", { href: source, download: "" }, say("shared.save")), link.offered && element("a.button.quiet", { href: link.offered, download: "" }, say("shared.save_clear")))),
     element("section.reel-view", { "aria-label": say("reel.watch") }, stage, element("div.stage-controls", {}, element("p.soft", {}, say("shared.what")), wholeScreen(stage, life)), time.node, figures?.node ?? ""),
     facts.node);
   return undefined;

@@ -1,12 +1,10 @@
 // The studio: a flock swims while its settings change. The settings are the query of the address, so a link is a flock.
 // @ts-check
-import { list } from "../app/api.js";
 import { element } from "../app/element.js";
 import { filmName, thing } from "../app/names.js";
 import { go, replaceAddress, setTitle } from "../app/router.js";
 import { signal } from "../app/store.js";
 import { say } from "../app/words.js";
-import { fileButton } from "../parts/drop.js";
 import { timeline } from "../parts/timeline.js";
 import { factsBox, orderOf } from "../studio/facts.js";
 import { maker } from "../studio/make.js";
@@ -20,17 +18,20 @@ import { share } from "../studio/share.js";
 import { stage } from "../studio/stage.js";
 import { thingsList } from "../studio/things-list.js";
 import { toolbar } from "../studio/toolbar.js";
-import { problemBox } from "../parts/problem.js";
+import { findLibrary, showWaiting, underWay } from "../studio/waiting.js";
+import { problemBox, showProblem } from "../parts/problem.js";
 
 /** @param {HTMLElement} root @param {import("../app/router.js").Visit} visit */
-export async function show(root, { id, query, life }) {
+export async function show(root, visit) {
+  const { id, query, life } = visit;
   const loading = loadFields();
   loading.catch(() => {});
-  if (id) thing("libraries", id).catch(() => {});
-  const libraries = (await list("/v1/libraries?limit=50", life)).items;
-  if (!id && !libraries.length) return showEmpty(root);
-  const libraryId = id || libraries[0].id;
-  const [library, fields] = await Promise.all([thing("libraries", libraryId), loading]);
+  const found = await findLibrary(id, life);
+  if (!found) return showWaiting(root, { id, life, onMeasured: () => fill(root, visit) });
+  const { library, libraries } = found;
+  const libraryId = library.id;
+  const fields = await loading;
+  life.throwIfAborted();
   const film = { fps: library.fps, size: library.image_size_px };
   const { settings: start, unknown } = readQuery(query, fields);
   const settings = createSettings(start);
@@ -46,9 +47,9 @@ export async function show(root, { id, query, life }) {
   const placed = () => placedOf(valueOf);
   const n = () => valueOf("count") ?? planned.plan?.nIndividuals ?? 20;
   const length_s = () => (valueOf("frames") ?? 400) / film.fps;
-  const query_of = () => writeQuery(settings.now.value);
-  const address = () => `/libraries/${libraryId}/studio${query_of() && `?${query_of()}`}`;
-  const tellAddress = () => replaceAddress(moment === null ? address() : `${address()}${query_of() ? "&" : "?"}t=${moment}`);
+  const queryText = () => writeQuery(settings.now.value);
+  const address = () => `/libraries/${libraryId}/studio${queryText() && `?${queryText()}`}`;
+  const tellAddress = () => replaceAddress(moment === null ? address() : `${address()}${queryText() ? "&" : "?"}t=${moment}`);
 
   const time = timeline({ life, seek: (frame) => view.seek(frame), toggle: () => view.toggle(), onScrub: (time_s) => { moment = time_s.toFixed(2); tellAddress(); } });
   const view = stage({ libraryId, size: film.size, life, tool, startFrame: moment === null ? null : Math.round(Number(moment) * film.fps) || 0,
@@ -57,12 +58,13 @@ export async function show(root, { id, query, life }) {
     onPath: (path) => settings.change({ predator: { ...placed().predator, path } }), length_s });
   const layer = overlay({ canvas: view.canvas, size: film.size, life, tool, placed, length_s, change: settings.change, onSelect: (key) => things.select(key) });
   const side = panel({ fields, change: settings.change, valueOf, film, formats: fields.get("render.formats")?.choices ?? [] });
-  const things = thingsList({ node: side.things, placed, change: settings.change, layer, tool });
+  const things = thingsList({ node: side.things, life, placed, change: settings.change, layer, tool });
   const tools = toolbar({ tool, life, add: layer.add, undo: settings.undo, redo: settings.redo, compare: (isOn) => view.compare(isOn ? settings.before : null, planner) });
   view.put(layer.node, tools.hint);
   const facts = factsBox();
   const ways = share(library);
   const again = element("button.quiet.again", { type: "button", title: say("studio.again.help"), onclick: () => settings.change(Object.fromEntries(Object.keys(settings.now.value).map((name) => [name, undefined])), { step: "all" }) }, element("span.sign", { "aria-hidden": "true" }, "↺"), element("span", {}, say("studio.again")));
+  const cards = underWay({ life, onMeasured: offer });
   const trouble = element("div.trouble");
   view.node.append(trouble);
   const place = element("section.studio-view", { "aria-label": say("studio.view") }, tools.node, view.node, time.node);
@@ -75,8 +77,9 @@ export async function show(root, { id, query, life }) {
   setTitle(say("studio.title", { film: filmName(library) }));
   root.append(
     element("header.place-head", {}, element("div.studio-title", {}, element("h1", { tabIndex: -1 }, say("studio.title", { film: filmName(library) })), element("a", { href: `/libraries/${libraryId}` }, say("studio.desk"))),
-      element("p.actions", {}, animals(libraries, libraryId, query_of), again, tools.acts)),
+      element("p.actions", {}, animals(libraries, libraryId, queryText), again, tools.acts)),
     unknown.length > 0 && element("p.advice-line", {}, say("studio.unknown", { names: unknown.join(", ") })) || "",
+    cards,
     element("div.studio", {},
       place,
       element("section.studio-panel", { "aria-label": say("studio.panel") }, side.node, maker({ libraryId, settings: () => settings.now.value, life, beside: ways.button }).node, ways.node),
@@ -113,6 +116,22 @@ export async function show(root, { id, query, life }) {
     planner.ask(settings.now.value, settings.before);
   }, life);
   tool.watch(() => things.draw(), life);
+
+  /** Goes to an animal that was measured meanwhile, or offers it to a person who has begun. @param {string} measured its library */
+  async function offer(measured) {
+    const there = `/libraries/${measured}/studio`;
+    if (!id && !settings.canUndo && again.hidden) return go(there);
+    const film = filmName(await thing("libraries", measured).catch(() => null));
+    return cards.before(element("p.done", { role: "status" }, say("studio.measured", { film }), " ", element("a.button", { href: there }, say("film.studio"))));
+  }
+}
+
+/** Fills the place when its animal is measured. @param {HTMLElement} root @param {import("../app/router.js").Visit} visit */
+async function fill(root, visit) {
+  const hadFocus = root.contains(document.activeElement);
+  root.replaceChildren();
+  await show(root, visit).catch((problem) => { if (!visit.life.aborted) showProblem(root, problem); });
+  if (hadFocus) /** @type {HTMLElement | null} */ (root.querySelector("h1"))?.focus({ preventScroll: true });
 }
 
 /** The choice of the animal, if there are several. @param {any[]} libraries @param {string} libraryId @param {() => string} query */
@@ -121,10 +140,4 @@ function animals(libraries, libraryId, query) {
   const choose = element("select.animals", { "aria-label": say("studio.animal"), onchange: () => go(`/libraries/${choose.value}/studio?${query()}`) }, ...options);
   choose.hidden = libraries.length < 2;
   return choose;
-}
-
-/** @param {HTMLElement} root */
-function showEmpty(root) {
-  setTitle(say("nav.studio"));
-  root.append(element("h1", { tabIndex: -1 }, say("nav.studio")), element("p", {}, say("studio.empty")), element("p.actions", {}, fileButton(say("home.choose"))));
 }

@@ -20,7 +20,7 @@ const TOKENS = ["ink", "ink-soft", "line", "accent", "water", "sunken"];
  * @param {any} flock @param {{seek: (frame: number) => void, life: AbortSignal}} options
  */
 export function askedAndShown(flock, { seek, life }) {
-  const room = element("div.asked-room");
+  const box = element("div.asked-box");
   let frame = 0;
   /** @type {ReturnType<typeof plotOf> | null} */
   let plot = null;
@@ -28,17 +28,17 @@ export function askedAndShown(flock, { seek, life }) {
   const open = async () => {
     if (!node.open || isAsked) return;
     isAsked = true;
-    room.replaceChildren(element("p.soft", {}, say("reel.asked.loading")));
+    box.replaceChildren(element("p.soft", {}, say("reel.asked.loading")));
     try {
       plot = plotOf(await get(`/v1/flocks/${flock.id}/flock.json`, life), { seek, life });
-      room.replaceChildren(plot.node);
+      box.replaceChildren(plot.node);
       plot.setFrame(frame);
     } catch (problem) {
       isAsked = false;
-      if (!life.aborted) room.replaceChildren(problemBox(problem));
+      if (!life.aborted) box.replaceChildren(problemBox(problem));
     }
   };
-  const node = element("details.asked", { ontoggle: open }, element("summary", {}, say("reel.asked")), element("p.soft", {}, say("reel.asked.help")), room);
+  const node = element("details.asked", { ontoggle: open }, element("summary", {}, say("reel.asked")), element("p.soft", {}, say("reel.asked.help")), box);
   return { node, setFrame(/** @type {number} */ now) { frame = now; plot?.setFrame(now); } };
 }
 
@@ -46,7 +46,7 @@ export function askedAndShown(flock, { seek, life }) {
 function plotOf({ individuals, fps }, { seek, life }) {
   const canvas = element("canvas.asked-plot", { role: "img", "aria-label": say("reel.asked.label") });
   const words = element("p.asked-words");
-  const table = element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("reel.asked.pieces") });
+  const table = element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("reel.asked.pieces") });
   const choose = element("select", { onchange: () => take() }, ...individuals.map((/** @type {any} */ one) => element("option", { value: String(one.id) }, say("reel.asked.animal", { id: String(one.id) }))));
   const last = () => Math.max(1, one.heading_rad.length);
   let one = individuals[0];
@@ -128,7 +128,7 @@ function plotOf({ individuals, fps }, { seek, life }) {
   canvas.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => { if (canvas.hasPointerCapture(event.pointerId)) at(event); }, { signal: life });
   const observer = new ResizeObserver(ask);
   observer.observe(canvas);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", ask, { signal: life });
+  addEventListener("theme", ask, { signal: life });
   life.addEventListener("abort", () => observer.disconnect());
   take();
   const key = element("p.asked-key", {}, element("label", {}, element("span.unseen", {}, say("reel.asked.choose")), choose), element("span.key-asked", {}, say("reel.asked.boid")), element("span.key-shown", {}, say("reel.asked.shown")));

@@ -13,7 +13,7 @@ export function fileTable(flock, film, life) {
   const heads = ["name", "use", "size"].map((name) => element("th", { scope: "col" }, say(`reel.files.${name}`)));
   const rows = filesOf(flock).map((name) => row(name, { flock, film, life }));
   return element("section", {}, element("h2", {}, say("reel.files")),
-    element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("reel.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
+    element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("reel.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
 }
 
 /** @param {string} name @param {{flock: any, film: string, life: AbortSignal}} of */

@@ -1,6 +1,6 @@
 // The rendered film of a flock: plays, seeks by exact frames, and tells which frame is on the screen.
 // @ts-check
-import { element } from "../app/element.js";
+import { element, releaseVideo } from "../app/element.js";
 import { say } from "../app/words.js";
 
 /** Share of a frame by which the film's clock may be early, against rounding. */
@@ -46,7 +46,7 @@ export function film({ src, poster, fps, n_frames, label, life, onFrame, onState
   video.addEventListener("play", () => tell(true), { signal: life });
   video.addEventListener("pause", () => tell(false), { signal: life });
   video.addEventListener("error", () => { tell(false); onBroken(); }, { signal: life });
-  life.addEventListener("abort", () => { video.pause(); video.removeAttribute("src"); video.load(); });
+  life.addEventListener("abort", () => releaseVideo(video));
 
   return {
     node: video, video,

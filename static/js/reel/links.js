@@ -3,10 +3,10 @@
 import { post } from "../app/api.js";
 import { element } from "../app/element.js";
 import { day, say } from "../app/words.js";
+import { isHere, linkTo } from "../parts/film-buttons.js";
 import { problemBox } from "../parts/problem.js";
-import { copyButton } from "../studio/share.js";
+import { copyTextOf } from "../studio/share.js";
 import { filesOf } from "./settings.js";
-import { pathOf, SHARED } from "./shared-link.js";
 
 /** How long a link works, s. The service allows a minute to a week. */
 const LIVES_S = { hour: 3600, day: 86_400, week: 604_800 };
@@ -26,25 +26,29 @@ export function linkMaker(flock, life) {
     button.disabled = true;
     try {
       const expires_s = /** @type {Record<string, number>} */ (LIVES_S)[lasting.value];
-      const sign = (/** @type {string} */ name) => post(`/v1/flocks/${flock.id}/links`, { file: name, expires_s }, life);
-      const links = await Promise.all((file.value === PAGE ? SHARED : [file.value]).map(sign));
+      const name = file.value;
+      const link = name === PAGE ? await linkTo(flock, expires_s, life) : await signed(name, expires_s);
       trouble.replaceChildren();
-      made.prepend(file.value === PAGE ? row(say("reel.link.page"), { url: pathOf(flock.id, links), expires_at: links[0].expires_at }) : row(file.value, links[0]));
+      made.prepend(row(name === PAGE ? say("reel.link.page") : name, link));
     } catch (problem) {
       if (!life.aborted) trouble.replaceChildren(problemBox(problem));
     }
     button.disabled = false;
   }
 
-  const isHere = /^(localhost|127\.|\[::1\])/.test(location.hostname);
-  return element("section", {}, element("h2", {}, say("reel.share")), element("p.soft", {}, say("reel.share.help"), isHere && ` ${say("reel.share.here", { host: location.host })}`),
+  async function signed(/** @type {string} */ name, /** @type {number} */ expires_s) {
+    const { url, expires_at } = await post(`/v1/flocks/${flock.id}/links`, { file: name, expires_s }, life);
+    return { url: location.origin + url, expires_at };
+  }
+
+  return element("section", {}, element("h2", {}, say("reel.share")), element("p.soft", {}, say("reel.share.help"), isHere() && ` ${say("reel.share.here", { host: location.host })}`),
     element("form.link-form", { onsubmit: make }, element("label.field", {}, say("reel.link.file"), file), element("label.field", {}, say("reel.link.lasting"), lasting), button), trouble, made);
 }
 
 /** @param {string} name @param {{url: string, expires_at: string}} link */
 function row(name, { url, expires_at }) {
-  const text = element("pre", { tabIndex: 0 }, location.origin + url);
-  const copy = copyButton(say("share.copy"), text);
+  const text = element("pre", { tabIndex: 0 }, url);
+  const copy = copyTextOf(text, say("share.copy"));
   copy.setAttribute("aria-label", say("share.copy.of", { name }));
   return element("li", {}, element("div.way-head", {}, element("span", {}, element("strong", {}, name), " ", element("small", {}, say("reel.link.until", { time: day(expires_at) }))), copy), text);
 }

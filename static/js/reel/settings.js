@@ -1,6 +1,7 @@
 // The settings of a flock that was made, as a link to the studio, and the names of its files.
 // @ts-check
 import { at, writeQuery } from "../studio/settings.js";
+import { OFFERED, SHARED } from "./shared-link.js";
 
 /**
  * Returns the settings of a flock that differ from the defaults, as the studio names them.
@@ -39,6 +40,15 @@ export function filesOf(flock) {
   const wanted = Object.entries(OF_FORMAT).flatMap(([format, name]) => (formats.includes(format) ? [name] : []));
   return ["video.mp4", ...wanted, ...(overlay ? ["overlay.mp4"] : []), ...(ground_truth ? ["tracks.csv", "ground-truth.zip"] : []), "flock.json", "flock.plan", "plan.svg"];
 }
+
+/** Returns the name of the transparent film of a transparent flock, if there is one. @param {any} flock @returns {string | undefined} */
+const clearFileOf = (flock) => (flock.params.render?.background === "transparent" ? Object.values(OFFERED).find((name) => filesOf(flock).includes(name)) : undefined);
+
+/** Returns the name of the film that a person expects. @param {any} flock */
+export const filmFileOf = (flock) => clearFileOf(flock) ?? "video.mp4";
+
+/** Returns the names of the files that a link for friends opens. @param {any} flock @returns {string[]} */
+export const sharedFilesOf = (flock) => [...SHARED, clearFileOf(flock) ?? ""].filter(Boolean);
 
 /** Returns the name under which a file is saved, such as "goldfish_20x400_s1.mp4". @param {string} name @param {any} flock @param {string} film */
 export function savedName(name, { count, frames, seed }, film) {

@@ -1,4 +1,4 @@
-// The order of the flock over time: polarization, milling and nearest neighbor on one axis with one cursor.
+// The order of the flock over time: agreement of headings, circling and nearest neighbor on one axis with one cursor.
 // @ts-check
 import { element, svg } from "../app/element.js";
 import { clock, count, language, say } from "../app/words.js";
@@ -55,7 +55,7 @@ export function strips(plan, { seek }) {
   const rows = all.map((series) => row(series, { last, seek }));
   const table = element("table");
   const details = element("details", { ontoggle: () => { if (details.open && !table.childElementCount) table.append(...tableOf(plan, all)); } },
-    element("summary", {}, say("timeline.table")), element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("reel.strips") }, table));
+    element("summary", {}, say("timeline.table")), element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("reel.strips") }, table));
   return {
     node: element("section.strips", { "aria-label": say("reel.strips") }, ...rows.map((one) => one.node), details),
     setFrame(frame) { for (const one of rows) one.setFrame(frame); },
@@ -79,7 +79,7 @@ function row({ name, values, mean, most }, { last, seek }) {
   plot.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => { if (plot.hasPointerCapture(event.pointerId)) at(event); });
   const means = say("reel.strip.means", { mean: told(mean), most: count(most) });
   return {
-    node: element("figure.reel-strip", {}, element("figcaption", {}, element("strong", {}, say(`reel.strip.${name}`)), " ", element("small", {}, means)), plot, value),
+    node: element("figure.reel-strip", {}, element("figcaption", {}, element("strong", {}, say(`reel.strip.${name}`)), " ", element("small", {}, say(`reel.strip.${name}.help`), " ", means)), plot, value),
     setFrame(/** @type {number} */ frame) {
       for (const end of ["x1", "x2"]) now.setAttribute(end, String((frame / last) * POINTS));
       value.textContent = say("reel.strip.now", { value: told(values[frame] ?? 0) });

@@ -5,18 +5,16 @@ import { request } from "../app/api.js";
 import { element } from "../app/element.js";
 import { count, percent, say } from "../app/words.js";
 import { loadAtlas } from "../flock/atlas.js";
-import { colorOf, shapesOf } from "./shapes.js";
+import { strokeBoxes, WHOLE, writeId } from "./boxes.js";
+import { shapesOf } from "./shapes.js";
 import { createTracks, readTracks } from "./tracks.js";
 
 /** Parts of the layer. */
 export const PARTS = ["boxes", "shapes", "ids"];
-/** Opacity of the shapes, and size of the ids in pixels of the screen. */
+/** Opacity of the shapes. */
 const SHAPE_OPACITY = 0.6;
-const ID_PX = 12;
 /** Time between two updates of the table, ms. */
 const FILL_MS = 200;
-/** Share of an animal that is seen, below which it counts as hidden in part. */
-const WHOLE = 0.995;
 
 /**
  * @param {{flock: any, plan: () => Promise<any>, on: string[], size: () => number[], life: AbortSignal, onChange: (on: string[]) => void, onProblem: (problem: any) => void}} options
@@ -26,7 +24,7 @@ export function truthLayer({ flock, plan, on, size, life, onChange, onProblem })
   const canvas = element("canvas.truth", { role: "img", hidden: true });
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   const layer = /** @type {HTMLCanvasElement} */ (document.createElement("canvas"));
-  const tracks = createTracks();
+  let tracks = createTracks();
   /** @type {Promise<any> | null} */
   let loading = null;
   /** @type {Promise<void> | null} */
@@ -38,13 +36,20 @@ export function truthLayer({ flock, plan, on, size, life, onChange, onProblem })
   const body = element("tbody");
   const heads = ["id", "x_px", "y_px", "visibility"].map((name) => element("th", { scope: "col" }, say(`reel.truth.${name}`)));
   const table = element("details.truth-table", { hidden: true, ontoggle: () => { if (table.open) load(); fill(); } }, element("summary", {}, say("reel.truth.table")),
-    element("div.table-room", { tabIndex: 0, role: "region", "aria-label": say("reel.truth.table") }, element("table", {}, element("thead", {}, element("tr", {}, ...heads)), body)));
+    element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("reel.truth.table") }, element("table", {}, element("thead", {}, element("tr", {}, ...heads)), body)));
   const inputs = PARTS.map((name) => element("input", { type: "checkbox", value: name, checked: on.includes(name), onchange: change }));
   const choices = element("fieldset.choices", {}, element("legend.unseen", {}, say("reel.truth")), ...inputs.map((input) => element("label.choice", {}, input, element("span", {}, say(`reel.truth.${input.value}`)))));
 
   function load() {
-    loading ??= request("GET", `/v1/flocks/${flock.id}/tracks.csv`, { signal: life }).then((response) => readTracks(response, part, tracks)).then(draw);
-    loading.catch((problem) => { if (!life.aborted) onProblem(problem); });
+    loading ??= read().catch((problem) => {
+      loading = null;
+      if (!life.aborted) onProblem(problem);
+    });
+  }
+  async function read() {
+    tracks = createTracks();
+    await readTracks(await request("GET", `/v1/flocks/${flock.id}/tracks.csv`, { signal: life }), part, tracks);
+    draw();
   }
   /** Draws when the frame that is shown has been read. */
   function part() {
@@ -68,8 +73,7 @@ export function truthLayer({ flock, plan, on, size, life, onChange, onProblem })
     table.hidden = !on.length;
     if (on.length) load();
     if (on.includes("shapes")) {
-      shaping ??= loadShapes();
-      shaping.catch((problem) => { shaping = null; if (!life.aborted) onProblem(problem); });
+      shaping ??= loadShapes().catch((problem) => { shaping = null; if (!life.aborted) onProblem(problem); });
     }
     draw();
   }
@@ -99,13 +103,16 @@ export function truthLayer({ flock, plan, on, size, life, onChange, onProblem })
   /** @param {{zoom: number, left: number, top: number}} view @param {import("./tracks.js").Track[]} rows */
   function paintShapes({ zoom, left, top }, rows) {
     // Near animals hide far ones; only then does the film shine through.
-    [layer.width, layer.height] = [canvas.width, canvas.height];
+    if (layer.width !== canvas.width || layer.height !== canvas.height) [layer.width, layer.height] = [canvas.width, canvas.height];
     const pen = /** @type {CanvasRenderingContext2D} */ (layer.getContext("2d"));
+    pen.clearRect(0, 0, layer.width, layer.height);
+    pen.save();
     pen.setTransform(zoom, 0, 0, zoom, left, top);
     pen.beginPath();
     pen.rect(0, 0, size()[0], size()[1]);
     pen.clip();
     drawShapes?.(pen, frame, rows);
+    pen.restore();
     context.globalAlpha = SHAPE_OPACITY;
     context.drawImage(layer, 0, 0);
     context.globalAlpha = 1;
@@ -115,34 +122,9 @@ export function truthLayer({ flock, plan, on, size, life, onChange, onProblem })
     body.replaceChildren(...tracks.at(frame).map(({ id, x, y, visibility }) => element("tr", {}, ...[String(id), count(x), count(y), percent(visibility)].map((text) => element("td", {}, text)))));
   }
 
-  new ResizeObserver(draw).observe(canvas);
+  const observer = new ResizeObserver(draw);
+  observer.observe(canvas);
+  life.addEventListener("abort", () => { observer.disconnect(); clearTimeout(filling); });
   begin();
   return { canvas, choices, table, draw, setFrame: (/** @type {number} */ next) => { [frame, isRead] = [next, tracks.nFrames > next + 1]; draw(); } };
-}
-
-/** Draws the visible box, and with dashes the box of the whole animal if a part is hidden. @param {CanvasRenderingContext2D} context @param {import("./tracks.js").Track} track @param {number} px a pixel of the screen */
-function strokeBoxes(context, { id, visible, amodal, visibility }, px) {
-  const stroke = (/** @type {number[]} */ [x, y, w, h], /** @type {number[]} */ dashes) => {
-    for (const [color, width] of /** @type {[string, number][]} */ ([["#0a1114b0", 4], [colorOf(id), 2]])) {
-      context.setLineDash(dashes);
-      context.strokeStyle = color;
-      context.lineWidth = width * px;
-      context.strokeRect(x, y, w, h);
-    }
-    context.setLineDash([]);
-  };
-  if (amodal && visibility < WHOLE) stroke(amodal, [4 * px, 4 * px]);
-  if (visible) stroke(visible, []);
-}
-
-/** @param {CanvasRenderingContext2D} context @param {import("./tracks.js").Track} track @param {number} px */
-function writeId(context, { id, visible, amodal, x, y }, px) {
-  const box = visible ?? amodal ?? [x, y, 0, 0];
-  const text = String(id);
-  context.font = `600 ${ID_PX * px}px system-ui, sans-serif`;
-  const width = context.measureText(text).width + 6 * px;
-  context.fillStyle = "#0a1114d0";
-  context.fillRect(box[0], box[1] - 15 * px, width, 15 * px);
-  context.fillStyle = colorOf(id);
-  context.fillText(text, box[0] + 3 * px, box[1] - 3.5 * px);
 }

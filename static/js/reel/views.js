@@ -1,6 +1,7 @@
 // Two ways to see a flock on one time line: its film with the ground truth over it, and the flock alive.
 // @ts-check
 import { element } from "../app/element.js";
+import { isCalm } from "../app/motion.js";
 import { say } from "../app/words.js";
 import { chase } from "../parts/chase.js";
 import { living } from "../parts/living.js";
@@ -15,7 +16,7 @@ export const VIEWS = ["film", "living"];
  *   `startFrame`: the flock rests at this frame; null plays
  */
 export function createViews({ flock, plan, size, poster, startFrame, life, onFrame, onState, onProblem }) {
-  const starts = startFrame === null && !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const starts = startFrame === null && !isCalm();
   let [frame, name] = [startFrame ?? 0, ""];
   // Only the present view is heard. The living flock starts by itself, which does not count.
   const from = (/** @type {string} */ of) => ({

@@ -34,14 +34,16 @@ export function control(field, studio) {
 export function framed({ name, help }, studio, { input, below, before = false }) {
   const id = `control-${n_controls += 1}`;
   const title = nameOf(name);
-  const more = element("p.help", { id: `${id}-help`, hidden: true, lang: "en" }, help);
+  // The service describes its settings in English only.
+  const hint = sayOr(`hint.${name}`, "");
+  const more = element("p.help", { id: `${id}-help`, hidden: true, ...(hint ? {} : { lang: "en" }) }, hint || help);
   const open = element("button.small-button", { type: "button", "aria-label": say("set.help", { name: title }), "aria-expanded": "false", "aria-controls": more.id, onclick: () => {
     more.hidden = !more.hidden;
     open.setAttribute("aria-expanded", String(!more.hidden));
   } }, "?");
   const reset = element("button.small-button", { type: "button", hidden: true, title: say("set.reset", { name: title }), "aria-label": say("set.reset", { name: title }), onclick: () => { studio.change({ [name]: undefined }); input?.focus(); } }, "↺");
   const label = element(input ? "label" : "span", input ? { htmlFor: input.id ||= id } : {}, title);
-  const node = element("div.control", language === "en" ? { title: help } : {}, element("div.control-line", {}, before && input, label, help && open, reset, !before && input), below, more);
+  const node = element("div.control", hint || language === "en" ? { title: hint || help } : {}, element("div.control-line", {}, before && input, label, (hint || help) && open, reset, !before && input), below, more);
   node.dataset.name = name;
   return { node, setReset: (/** @type {boolean} */ isSet, isIdle = false) => { reset.hidden = !isSet; node.classList.toggle("is-set", isSet); node.classList.toggle("is-idle", isIdle); } };
 }

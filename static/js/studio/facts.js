@@ -9,7 +9,7 @@ const CLONES = 0.05;
 const MOST_CELLS = 20_000;
 
 /** Returns the sentences about a plan. @param {any} plan */
-export function sentencesOf({ head: { stats }, nIndividuals: n, isPart, nFrames, fps }) {
+function sentencesOf({ head: { stats }, nIndividuals: n, isPart, nFrames, fps }) {
   const facts = [];
   const advice = [];
   const order = stats.polarization;

@@ -1,8 +1,9 @@
-// Which setting stands in which group of the panel. Settings that the service has and this table lacks are shown
-// among the fine adjustments.
+// The part of the panel in which each setting is. Settings that the service has and this table lacks are shown among
+// the fine adjustments.
 // @ts-check
 
-const MAIN = ["count", "frames", "seed", "loop"];
+const MAIN = ["count", "frames"];
+const MORE = ["seed", "loop"];
 const MOVE = ["rules.alignment", "rules.cohesion", "rules.separation", "rules.wander", "rules.circling", "rules.walls", "spacing_bl", "leaders", "variation", "depth_bl", "position", "tank"];
 const FINE = ["rules.separation_bl", "rules.alignment_bl", "rules.cohesion_bl", "rules.picture_separation_bl", "rules.view_deg", "rules.neighbors", "separation", "mirror", "dwell_frames", "fade_frames"];
 const ZONES = ["rules.zones.repulsion_bl", "rules.zones.orientation_bl", "rules.zones.attraction_bl", "rules.zones.noise_rad"];
@@ -20,9 +21,9 @@ const REPLACED = ["rules.separation", "rules.alignment", "rules.cohesion", "rule
  */
 export function grouped(fields) {
   const names = [...fields.values()].filter(({ kind }) => kind !== "group" && kind !== "other").map(({ name }) => name);
-  const placed = new Set([MAIN, MOVE, FINE, LOOK, FILES, OWN, ZONES, MATCHING].flat());
+  const placed = new Set([MAIN, MORE, MOVE, FINE, LOOK, FILES, OWN, ZONES, MATCHING].flat());
   const known = (/** @type {string[]} */ list) => list.filter((name) => fields.has(name));
-  return { main: known(MAIN), move: known(MOVE), fine: [...known(FINE), ...names.filter((name) => !placed.has(name))], zones: known(ZONES), matching: known(MATCHING), look: known(LOOK), files: known(FILES) };
+  return { main: known(MAIN), more: known(MORE), move: known(MOVE), fine: [...known(FINE), ...names.filter((name) => !placed.has(name))], zones: known(ZONES), matching: known(MATCHING), look: known(LOOK), files: known(FILES) };
 }
 
 /** Returns whether a setting is void under others. @param {string} name @param {(name: string) => any} value of another setting */

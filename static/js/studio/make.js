@@ -4,6 +4,7 @@ import { post } from "../app/api.js";
 import { element } from "../app/element.js";
 import { ended, expect } from "../app/jobs.js";
 import { say } from "../app/words.js";
+import { filmButtons } from "../parts/film-buttons.js";
 import { problemBox } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
 import { bodyOf } from "./settings.js";
@@ -37,7 +38,7 @@ export function maker({ libraryId, settings, life, beside }) {
         if (!card) place.append(card = jobCard(job));
         card.update(job);
       });
-      place.replaceChildren(element("p.done", {}, say("make.done"), " ", element("a.button", { href: `/flocks/${flockId}` }, say("make.open"))));
+      place.replaceChildren(element("p.done", {}, say("make.done"), " ", element("a.button", { href: `/flocks/${flockId}` }, say("make.open")), ...filmButtons(flockId)));
     } catch (problem) {
       if (!life.aborted && /** @type {any} */ (problem).name === "AbortError") place.remove();
     }

@@ -75,7 +75,7 @@ export function overlay({ canvas, size, life, tool, placed, length_s, change, on
   }
 
   layer.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
-    if (event.button !== 0) return;
+    if (event.button !== 0 || gesture) return;
     const target = /** @type {Element} */ (event.target);
     const key = target.closest(".thing")?.getAttribute("data-key");
     const at = pointOf(event);

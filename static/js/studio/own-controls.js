@@ -10,15 +10,15 @@ import { CLEAR } from "./ways.js";
 /** Sizes that editors ask for. */
 const SIZES = [[1280, 720], [1920, 1080], [1080, 1920], [1080, 1080]];
 
-/** @param {string} name @param {string} value @param {string} label @param {() => void} choose */
-const radio = (name, value, label, choose) => {
+/** Returns one of several choices that are all in sight. @param {string} name @param {string} value @param {string} label @param {() => void} choose @param {string} [help] */
+export const radio = (name, value, label, choose, help = "") => {
   const input = element("input", { type: "radio", name, value, onchange: choose });
-  return { input, node: element("label.chip", {}, input, element("span", {}, label)) };
+  return { input, node: element("label.chip", { title: help }, input, element("span", {}, label)) };
 };
 
 /** Buttons for the behaviors. @param {Studio} studio */
 export function presets(studio) {
-  const all = (studio.fields.get("preset")?.choices ?? []).map((name) => radio("preset", name, choiceOf("preset", name), () => studio.change({ preset: name })));
+  const all = (studio.fields.get("preset")?.choices ?? []).map((name) => radio("preset", name, choiceOf("preset", name), () => studio.change({ preset: name }), sayOr(`preset.${name}`, "")));
   const help = element("p.soft");
   return {
     node: element("fieldset.presets", {}, element("legend", {}, nameOf("preset")), element("div.chips", {}, ...all.map(({ node }) => node)), help),

@@ -1,4 +1,4 @@
-// The panel: presets, the few settings that matter most, and groups with all the others.
+// The panel: presets, the few settings that matter most, among them flight and background, and groups with all the others.
 // @ts-check
 import { element } from "../app/element.js";
 import { say } from "../app/words.js";
@@ -33,9 +33,9 @@ export function panel(studio) {
   const useZones = element("input", { type: "checkbox", onchange: () => studio.change({ "rules.zones": useZones.checked ? {} : null, ...Object.fromEntries(names.zones.map((name) => [name, undefined])) }, { step: "rules.zones" }) });
   const zones = element("div", {}, ...plain(names.zones));
   const things = element("div.things-list");
-  const node = element("div.settings", {}, behaviors.node, ...plain(names.main), things,
+  const node = element("div.settings", {}, behaviors.node, ...plain(names.main), things, ...own("render.background", background, valueOf), ...plain(names.more),
     group("move", ...plain(names.move), group("fine", ...plain(names.fine)), group("zones", element("label.check", {}, useZones, element("span", {}, say("zones.use"))), zones), group("matching", ...plain(names.matching))),
-    group("look", ...own("render.background", background, valueOf), ...own("render.size_px", size, film.size), ...plain(names.look), element("p.soft", {}, say("set.look.note"))),
+    group("look", ...own("render.size_px", size, film.size), ...plain(names.look), element("p.soft", {}, say("set.look.note"))),
     group("files", ...own("render.formats", files, studio.formats), ...plain(names.files)));
 
   return {

@@ -12,27 +12,27 @@ import { proseLimits } from "./limits.js";
 /** Presets of a service that does not list them. */
 const PRESETS = ["school", "swarm", "mill", "scatter", "zonal", "papers"];
 
-/** @type {Promise<{fields: Fields, analysis: Record<string, any>}> | null} */
+/** @type {Promise<Record<string, any>> | null} */
 let known = null;
 
-/** Asks the service once. */
+/** Returns the schemas of the service, which is asked once. */
 function load() {
-  known ??= get("/openapi.json").then(({ components: { schemas } }) => ({ fields: fieldsOf(schemas), analysis: defaultsOf(schemas.AnalysisParams) }));
+  known ??= get("/openapi.json").then(({ components }) => components.schemas);
   known.catch(() => { known = null; });
   return known;
 }
 
-/** Returns the fields of a flock. @returns {Promise<Fields>} */
-export const loadFields = async () => (await load()).fields;
+/** Returns the fields of a flock, or of a virtual fish. @param {"Flock" | "Fish"} [kind] @returns {Promise<Fields>} */
+export const loadFields = async (kind = "Flock") => fieldsOf(await load(), `${kind}Params`, `${kind}Request`);
 
-/** Returns the defaults of the parameters of an analysis by name. */
-export const analysisDefaults = async () => (await load()).analysis;
+/** Returns the defaults of the parameters of an analysis by name. @returns {Promise<Record<string, any>>} */
+export const analysisDefaults = async () => defaultsOf((await load()).AnalysisParams);
 
 /** @param {any} schema */
 const defaultsOf = (schema) => Object.fromEntries(Object.entries(schema?.properties ?? {}).map(([name, property]) => [name, property.default ?? null]));
 
 /** @param {Record<string, any>} schemas @param {string} params name of the schema of the settings @param {string} request the one that has the presets @returns {Fields} */
-export function fieldsOf(schemas, params = "FlockParams", request = "FlockRequest") {
+function fieldsOf(schemas, params, request) {
   /** @type {Fields} */
   const fields = new Map();
   const collect = (/** @type {any} */ schema, /** @type {string} */ prefix, /** @type {any} */ defaults) => {

@@ -1,37 +1,50 @@
-// The list of what lies in the picture, with the settings of the selected thing, for people who cannot or do not
-// want to use the picture itself.
+// What the animals flee from, and the list of what lies in the picture with the settings of the selected thing, for people
+// who cannot or do not want to use the picture itself.
 // @ts-check
 import { element } from "../app/element.js";
 import { say } from "../app/words.js";
+import { radio } from "./own-controls.js";
 import { titleOf } from "./shapes.js";
 import { thingsOf, withThing } from "./things.js";
+import { toolButtons } from "./toolbar.js";
 
 /** Settings of things: name, least, most, step. */
 const KNOBS = { goal: [["from_s", 0, 1e5, 0.1], ["until_s", 0, 1e5, 0.1], ["weight", 0, 20, 0.1]], predator: [["flee_bl", 0.1, 50, 0.1]], circle: [], box: [] };
 
+/** What they may flee from, and the tools that make the path of a predator. */
+const FLEE = ["nothing", "hunter", "path"];
+const PATH_TOOLS = ["predator", "chase"];
+
 /**
- * @param {{node: HTMLElement, placed: () => import("./things.js").Placed, change: (patch: any, options?: any) => void,
+ * @param {{node: HTMLElement, life: AbortSignal, placed: () => import("./things.js").Placed, change: (patch: any, options?: any) => void,
  *   layer: any, tool: import("../app/store.js").Signal<string>}} options
  */
-export function thingsList({ node, placed, change, layer, tool }) {
-  const flee = element("select#flee", { onchange: () => choose(flee.value) }, ...["nothing", "hunter", "path"].map((one) => element("option", { value: one }, say(`flee.${one}`))));
+export function thingsList({ node, life, placed, change, layer, tool }) {
+  const choices = FLEE.map((one) => radio("flee", one, say(`flee.${one}`), () => choose(one)));
+  const tools = element("p.actions", { hidden: true }, ...toolButtons(PATH_TOOLS, { tool, life, add: layer.add }));
+  const help = element("p.soft");
   const list = element("ul.thing-rows");
   const knobs = element("div.thing-knobs");
-  node.append(element("div.control", {}, element("div.control-line", {}, element("label", { htmlFor: "flee" }, say("flee.label")), flee)), list, knobs);
+  node.append(element("fieldset.presets#flee", {}, element("legend", {}, say("flee.label")), element("div.chips", {}, ...choices.map((one) => one.node)), tools, help), list, knobs);
   let [drawn, selected, shown] = ["", "", ""];
 
   /** @param {string} what */
   function choose(what) {
     const { flee_bl } = placed().predator ?? {};
     const kept = flee_bl == null ? {} : { flee_bl };
-    if (what === "path") layer.add("predator");
-    else change({ predator: what === "hunter" ? kept : undefined });
+    tool.set(what === "path" ? "predator" : "");
+    if (what !== "path") change({ predator: what === "hunter" ? kept : undefined });
   }
 
   function draw() {
     const { predator } = placed();
-    const value = predator ? (predator.path?.length ? "path" : "hunter") : "nothing";
-    flee.value = tool.value === "predator" && !predator ? "nothing" : value;
+    const isPath = PATH_TOOLS.includes(tool.value) || Boolean(predator?.path?.length);
+    const value = isPath ? "path" : predator ? "hunter" : "nothing";
+    for (const { input } of choices) input.checked = input.value === value;
+    const hadFocus = !isPath && tools.contains(document.activeElement);
+    tools.hidden = !isPath;
+    if (hadFocus) choices.find(({ input }) => input.checked)?.input.focus();
+    help.textContent = say(`flee.${value}.help`);
     const things = thingsOf(placed());
     const keys = things.map(titleOf).join();
     if (keys !== drawn) {

@@ -1,4 +1,4 @@
-// The tools on the picture: chase, goal, obstacles, predator; and undo, redo, compare.
+// The tools on the picture: goal and obstacles, and those for the path of a predator; and undo, redo, compare.
 // @ts-check
 import { element, svg } from "../app/element.js";
 import { say } from "../app/words.js";
@@ -12,21 +12,35 @@ const ICONS = {
   predator: "M3 17c4 0 4-10 9-10s4 8 9 6M17 9l4 4-5 2",
   undo: "M9 6L4 11l5 5M4 11h10a5 5 0 0 1 0 10h-3", redo: "M15 6l5 5-5 5M20 11H10a5 5 0 0 0 0 10h3", compare: "M4 5h7v14H4zM13 5h7v14h-7z",
 };
-const TOOLS = ["chase", "goal", "circle", "box", "predator"];
+const TOOLS = ["goal", "circle", "box"];
 
 /** @param {string} name */
 const icon = (name) => svg("svg", { viewBox: "0 0 24 24", "aria-hidden": "true", class: "tool-icon" }, svg("path", { d: /** @type {any} */ (ICONS)[name] }));
 
 /**
- * @param {{tool: import("../app/store.js").Signal<string>, life: AbortSignal, add: (kind: any) => void, undo: () => void, redo: () => void,
- *   compare: (isOn: boolean) => void}} options `add` puts a thing in the middle, for the keyboard
+ * Returns buttons that take a tool and put it back.
+ * @param {string[]} names @param {{tool: import("../app/store.js").Signal<string>, life: AbortSignal, add: (kind: any) => void}} options
+ *   `add` puts a thing in the middle, for the keyboard
  */
-export function toolbar({ tool, life, add, undo, redo, compare }) {
-  const buttons = TOOLS.map((name) => {
-    const button = element("button.tool", { type: "button", title: say(`tool.${name}.help`), "aria-pressed": "false", onclick: (/** @type {MouseEvent} */ event) => choose(name, event.detail === 0) }, icon(name), element("span", {}, say(`tool.${name}`)));
+export function toolButtons(names, { tool, life, add }) {
+  const choose = (/** @type {string} */ name, /** @type {boolean} */ byKey) => {
+    if (byKey && name !== "chase") add(name);
+    else tool.set(tool.value === name ? "" : name);
+  };
+  return names.map((name) => {
+    const button = element("button.tool", { type: "button", title: say(`tool.${name}.help`), onclick: (/** @type {MouseEvent} */ event) => choose(name, event.detail === 0) }, icon(name), element("span", {}, say(`tool.${name}`)));
     button.dataset.tool = name;
+    tool.watch((now) => button.setAttribute("aria-pressed", String(now === name)), life);
     return button;
   });
+}
+
+/**
+ * @param {{tool: import("../app/store.js").Signal<string>, life: AbortSignal, add: (kind: any) => void, undo: () => void, redo: () => void,
+ *   compare: (isOn: boolean) => void}} options
+ */
+export function toolbar({ tool, life, add, undo, redo, compare }) {
+  const buttons = toolButtons(TOOLS, { tool, life, add });
   const act = (/** @type {string} */ name, /** @type {() => void} */ onclick) => element("button.tool", { type: "button", title: say(`tool.${name}.help`), "aria-label": say(`tool.${name}`), onclick }, icon(name));
   const [back, forth] = [act("undo", undo), act("redo", redo)];
   const other = act("compare", () => {});
@@ -34,14 +48,7 @@ export function toolbar({ tool, life, add, undo, redo, compare }) {
   const node = element("div.toolbar", { role: "toolbar", "aria-label": say("tool.label") }, ...buttons);
   const acts = element("span.actions", {}, back, forth, other);
 
-  /** @param {string} name @param {boolean} byKey */
-  function choose(name, byKey) {
-    if (byKey && name !== "chase") add(name);
-    else tool.set(tool.value === name ? "" : name);
-  }
-
   tool.watch((name) => {
-    for (const button of buttons) button.setAttribute("aria-pressed", String(button.dataset.tool === name));
     hint.hidden = !name;
     if (name) hint.textContent = say(`tool.${name}.help`);
   }, life);

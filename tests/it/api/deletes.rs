@@ -1,30 +1,17 @@
 //! Deletion: an object is deleted with its rows, its files and everything made from it, and nothing else.
 
 use flockreel::jobs::worker::{Step, Worker};
-use flockreel::jobs::{Attempt, Error, Product};
-use flockreel::store::jobs::Lease;
-use flockreel::store::jobs::finish::Source;
-use flockreel_core::progress::Progress;
 use reqwest::StatusCode;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::common::TestApp;
 use crate::common::app::code_of;
 use crate::common::clip::TINY;
+use crate::common::substitute::{UNTIL_STOPPED, done, with_script};
 
-/// Returns a result of the job's kind without doing its work.
-fn pretend(lease: &Lease, attempt: &Attempt) -> Result<Product, Error> {
-    std::fs::write(attempt.folder().join("some.json"), b"{}")?;
-    let input: Value = serde_json::from_str(&lease.input)?;
-    let id = |name: &str| serde_json::from_value(input[name].clone());
-    Ok(Product {
-        source: Source::Resource(match lease.kind.name() {
-            "analysis" => id("footage_id")?,
-            _ => id("library_id")?,
-        }),
-        params: "{}".into(),
-        summary: "{}".into(),
-    })
+/// Returns commands that make a result without doing the work of its job.
+fn pretend() -> String {
+    done(&[("some.json", "{}")], &json!({}))
 }
 
 /// Creates a footage with a library, a flock, a fish and a queued flock. Returns the paths of these and of
@@ -36,9 +23,9 @@ async fn family(app: &TestApp) -> Vec<String> {
     let of_library = json!({"library_id": library});
     let flock = app.accept("/v1/flocks", of_library.clone()).await;
     let fish = app.accept("/v1/fish", of_library.clone()).await;
-    let worker = Worker::new(app.context.clone());
+    let worker = Worker::new(with_script(&app.context, &pretend()));
     for _ in 0..3 {
-        let step = worker.step_by(pretend).await.unwrap();
+        let step = worker.step().await.unwrap();
         assert!(matches!(step, Step::Done(_)), "{step:?}");
     }
     let queued = app.accept("/v1/flocks", of_library).await;
@@ -127,22 +114,13 @@ async fn running_job_stores_nothing_after_its_footage_is_deleted() {
     let mut app = TestApp::idle().await;
     app.context.lease = std::time::Duration::from_millis(300);
     let footage = app.upload(&TINY).await;
-    app.accept("/v1/analyses", json!({"footage_id": footage}))
-        .await;
-    let (begun, has_begun) = tokio::sync::oneshot::channel();
-    let worker = Worker::new(app.context.clone());
-    let step = tokio::spawn(async move {
-        let work = move |lease: &Lease, attempt: &Attempt| {
-            begun.send(()).ok();
-            while !attempt.listener.cancelled() {
-                std::thread::yield_now();
-            }
-            // The job ignores the cancellation and finishes.
-            pretend(lease, attempt)
-        };
-        worker.step_by(work).await
-    });
-    has_begun.await.unwrap();
+    let accepted = app.accept("/v1/analyses", json!({"footage_id": footage}));
+    let job = accepted.await["job_id"].clone();
+    // The job ignores the cancellation and finishes.
+    let commands = format!("{UNTIL_STOPPED}{}", pretend());
+    let worker = Worker::new(with_script(&app.context, &commands));
+    let step = tokio::spawn(async move { worker.step().await });
+    app.job_when(&job, |job| job["state"] == "running").await;
     delete(&app, &format!("/v1/footage/{footage}")).await;
     assert!(matches!(step.await.unwrap().unwrap(), Step::Lost(_)));
     assert_eq!(folders(&app).await, [0, 0, 0, 0]);

@@ -1,11 +1,12 @@
 //! Range requests, conditional requests and HEAD, for an uploaded film (docs/explanation/promises.md,
-//! "Exact ranges").
+//! "Exact ranges" and "Bad networks").
 
 use reqwest::StatusCode;
 
 use crate::common::TestApp;
 use crate::common::app::code_of;
 use crate::common::clip::TINY;
+use crate::common::process::numbered_film;
 
 #[tokio::test]
 async fn range_returns_exactly_the_requested_bytes() {
@@ -145,5 +146,31 @@ async fn weak_etags_match_if_none_match_but_not_if_range() {
         let answer = request.header("if-range", &stale).send().await.unwrap();
         assert_eq!(answer.status(), StatusCode::OK, "{stale}");
     }
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn download_cut_at_every_tenth_continues_to_equal_bytes() {
+    let app = TestApp::idle().await;
+    let film = numbered_film(1);
+    let path = format!("/v1/footage/{}/file", app.upload(&film).await);
+    let (mut received, mut etag) = (Vec::new(), None);
+    for tenth in 1..=10 {
+        let range = format!("bytes={}-", received.len());
+        let mut request = app.get(&path).header("range", range);
+        if let Some(etag) = &etag {
+            request = request.header("if-range", etag);
+        }
+        let mut answer = request.send().await.unwrap();
+        assert_eq!(answer.status(), StatusCode::PARTIAL_CONTENT);
+        etag = Some(answer.headers()["etag"].clone());
+        // The client reads up to a tenth and closes the connection.
+        while received.len() < film.len() * tenth / 10 {
+            let piece = answer.chunk().await.unwrap().unwrap();
+            let n_wanted = film.len() * tenth / 10 - received.len();
+            received.extend_from_slice(&piece[..piece.len().min(n_wanted)]);
+        }
+    }
+    assert!(received == film, "the pieces differ from the film");
     app.assert_sound().await;
 }

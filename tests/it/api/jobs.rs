@@ -7,8 +7,8 @@ use crate::common::TestApp;
 use crate::common::app::{code_of, json_of};
 use crate::common::clip::TINY;
 use crate::common::film::Films;
+use crate::common::substitute::{failed as refused, with_script};
 use flockreel::jobs::worker::{Step, Worker};
-use flockreel::media;
 use flockreel::store::tokens::Scope;
 use flockreel_core::code::Code;
 
@@ -99,8 +99,11 @@ async fn lost_result_gives_the_code_and_the_link_of_its_job() {
     let app = TestApp::idle().await;
     let footage_id = app.upload(&TINY).await;
     let failed = analysis_of(&app, &footage_id).await;
-    let worker = Worker::new(app.context.clone());
-    let step = worker.step_by(|_, _| Err(media::Error::NoVideoStream.into()));
+    let worker = Worker::new(with_script(
+        &app.context,
+        &refused("no_video_stream", false),
+    ));
+    let step = worker.step();
     assert!(matches!(
         step.await.unwrap(),
         Step::Failed(_, Code::NoVideoStream)

@@ -72,6 +72,13 @@ async fn pages_of_a_filtered_list_follow_each_other() {
     let path = format!("/v1/footage?limit=1&cursor={cursor}");
     assert_eq!(ids(&app, &path).await, [footage]);
     assert_eq!(ids(&app, &format!("{path}&q=finch")).await, [""; 0]);
+    for noun in ["footage", "libraries", "flocks", "fish"] {
+        for name in ["%00", "a%00b"] {
+            let path = format!("/v1/{noun}?q={name}");
+            let answer = app.get(&path).send().await.unwrap();
+            assert_eq!(code_of(answer, 422).await, "invalid_params", "{path}");
+        }
+    }
     for wrong in ["limit=0", "limit=201", "footage_id=x", "nonsense=1"] {
         let answer = app
             .get(&format!("/v1/flocks?{wrong}"))
@@ -119,11 +126,8 @@ async fn new_name_of_footage_is_shown_by_everything_made_from_it() {
         let request = app.request(Method::PATCH, path).json(&body);
         request.send().await.unwrap()
     };
-    let answer = rename(
-        &results.footage,
-        json!({"name": "../zebra\u{202e} finch.mp4"}),
-    )
-    .await;
+    let name = json!({"name": "../zebra\u{202e} finch.mp4"});
+    let answer = rename(&results.footage, name).await;
     let footage = json_of(answer, StatusCode::OK).await;
     assert_eq!(footage["name"], "zebra finch.mp4");
     for path in [
@@ -164,6 +168,8 @@ async fn new_name_of_footage_is_shown_by_everything_made_from_it() {
     for (body, code) in [
         (json!({}), "invalid_params"),
         (json!({"name": 1}), "invalid_params"),
+        (json!({"name": null}), "invalid_params"),
+        (json!({"pinned": null}), "invalid_params"),
         (json!({"name": "a", "sample": true}), "invalid_params"),
     ] {
         let answer = rename(&results.footage, body).await;

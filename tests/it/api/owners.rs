@@ -34,6 +34,9 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("GET", "/v1/footage/{id}/file", Path("footage")),
         ("GET", "/v1/footage/{id}/poster.jpg", Path("footage")),
         ("PATCH", "/v1/footage/{id}", Path("footage")),
+        ("PATCH", "/v1/libraries/{id}", Path("libraries")),
+        ("PATCH", "/v1/flocks/{id}", Path("flocks")),
+        ("PATCH", "/v1/fish/{id}", Path("fish")),
         ("GET", "/v1/libraries", List),
         ("GET", "/v1/libraries/{id}", Path("libraries")),
         ("GET", "/v1/libraries/{id}/{file}", Path("libraries")),
@@ -46,6 +49,7 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("GET", "/v1/jobs", List),
         ("GET", "/v1/jobs/{id}", Path("jobs")),
         ("GET", "/v1/jobs/{id}/events", Path("jobs")),
+        ("POST", "/v1/jobs/{id}/retry", Path("jobs")),
         ("POST", "/v1/analyses", Body("footage_id", "footage")),
         ("POST", "/v1/flocks", Body("library_id", "libraries")),
         (
@@ -68,6 +72,7 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("POST", "/v1/footage", Nothing),
         ("POST", "/v1/uploads", Nothing),
         ("OPTIONS", "/v1/uploads", Nothing),
+        ("GET", "/v1/usage", Nothing), // of the caller's owner: tests/it/api/quota.rs
         ("GET", "/v1/errors", Nothing),
         ("POST", "/v1/session", Nothing),
         ("DELETE", "/v1/session", Nothing),
@@ -117,6 +122,9 @@ async fn response_of(
         Touch::Body(name, _) => request.json(&json!({ *name: id })),
         Touch::Path(_) if method == "POST" => request.json(&json!({})),
         Touch::Path("footage") if method == "PATCH" => request.json(&json!({"name": "x.mp4"})),
+        Touch::Path("libraries" | "flocks" | "fish") if method == "PATCH" => {
+            request.json(&json!({"pinned": true}))
+        }
         _ => request,
     };
     let request = match kind {

@@ -34,10 +34,16 @@ async fn preview_equals_the_flock_and_stores_nothing() {
         .unwrap();
     let preview = json_of(preview, StatusCode::OK).await;
     assert_eq!(app.json("/v1/flocks").await["items"], json!([]));
-    for accepted in ["application/vnd.flockreel.plan", "application/vnd.flockreel.plan;v=1, */*;q=0.1"] {
+    for accepted in [
+        "application/vnd.flockreel.plan",
+        "application/vnd.flockreel.plan;v=1, */*;q=0.1",
+    ] {
         let ask = app.post("/v1/flocks/preview").header("accept", accepted);
         let plan = ask.json(&request).send().await.unwrap();
-        assert_eq!(plan.headers()["content-type"], "application/vnd.flockreel.plan");
+        assert_eq!(
+            plan.headers()["content-type"],
+            "application/vnd.flockreel.plan"
+        );
         assert!(plan.bytes().await.unwrap().starts_with(b"FLOCKPLN"));
     }
 

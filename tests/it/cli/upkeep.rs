@@ -6,11 +6,14 @@ use std::process::{Command, Output};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
+use flockreel::store::Store;
+use flockreel::store::resources::ResourceKind;
 use serde_json::{Value, json};
 
 use crate::common::client;
 use crate::common::film::Films;
 use crate::common::process::{Server, numbered_film};
+use crate::common::results::id_in;
 
 fn flockreel(arguments: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_flockreel"))
@@ -202,6 +205,51 @@ fn assert_no_copy_is_made(films: &Films) {
     let backup = flockreel(&["backup", "copy", "--data", "data"], films.folder());
     assert_eq!(backup.status.code(), Some(1), "{}", said(&backup));
     assert!(!films.path("copy").exists());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn gc_deletes_what_is_older_than_its_settings_allow() {
+    let films = Films::new();
+    let server = Server::start(&films.path("data"));
+    let mut paths = Vec::new();
+    for number in 0..2 {
+        let footage: Value = server
+            .upload(numbered_film(number))
+            .await
+            .json()
+            .await
+            .unwrap();
+        paths.push(format!("/v1/footage/{}", footage["id"].as_str().unwrap()));
+    }
+    let pin = client().patch(format!("{}{}", server.base, paths[1]));
+    let pinned = pin.json(&json!({"pinned": true})).send().await.unwrap();
+    assert_eq!(pinned.status(), 200);
+    let store = Store::open_beside(&films.path("data")).await.unwrap();
+    for path in &paths {
+        let id = id_in(path).parse().unwrap();
+        let used = store.record_use(ResourceKind::Footage, id, 0);
+        used.await.unwrap();
+    }
+    store.close().await;
+    let gc = |flags: &str| {
+        let line = format!("gc --data data --json{flags}");
+        let done = flockreel(&line.split(' ').collect::<Vec<_>>(), films.folder());
+        serde_json::from_slice::<Value>(&done.stdout).unwrap()["unused"].clone()
+    };
+    let counts = [
+        "",
+        " --keep-days 9 --dry-run",
+        " --keep-days 9",
+        " --keep-days 9",
+    ]
+    .map(gc);
+    assert_eq!(counts, [0, 1, 1, 0]);
+    let statuses = [
+        server.get(&paths[0]).await.status(),
+        server.get(&paths[1]).await.status(),
+    ];
+    assert_eq!(statuses, [404, 200]);
+    assert_eq!(server.terminate(), Some(0));
 }
 
 #[tokio::test(flavor = "multi_thread")]

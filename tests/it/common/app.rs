@@ -50,14 +50,20 @@ impl TestApp {
 
     /// Starts a service without workers and with additional command-line flags.
     pub(crate) async fn start(flags: &[&str]) -> TestApp {
-        let place = Place::from_environment();
+        TestApp::on(Place::from_environment(), flags).await
+    }
+
+    /// Like [`TestApp::start`], on a place that may have data.
+    pub(crate) async fn on(place: Place, flags: &[&str]) -> TestApp {
         let flags = flags.iter().map(|flag| (*flag).to_owned());
         let flags = [vec!["test".to_owned()], place.flags(), flags.collect()].concat();
         let config = Arguments::parse_from(flags).config;
         let state = AppState::open(config).await.unwrap();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let base = format!("http://{}", listener.local_addr().unwrap());
-        let (context, stop) = (state.context.clone(), CancellationToken::new());
+        let (mut context, stop) = (state.context.clone(), CancellationToken::new());
+        // This program is the test.
+        context.attempt_program.0 = env!("CARGO_BIN_EXE_flockreel").into();
         tokio::spawn(api::server::serve(
             listener,
             api::router(state),
@@ -157,15 +163,20 @@ impl TestApp {
 
     /// Waits until the job has ended and returns it. Panics after two minutes.
     pub(crate) async fn ended_job(&self, id: &Value) -> Value {
+        self.job_when(id, |job| !job["finished_at"].is_null()).await
+    }
+
+    /// Polls the job until `is_so` holds and returns it. Panics after two minutes.
+    pub(crate) async fn job_when(&self, id: &Value, is_so: impl Fn(&Value) -> bool) -> Value {
         let path = format!("/v1/jobs/{}", id.as_str().unwrap());
-        for _ in 0..1200 {
+        for _ in 0..2400 {
             let job = self.json(&path).await;
-            if !job["finished_at"].is_null() {
+            if is_so(&job) {
                 return job;
             }
-            tokio::time::sleep(Duration::from_millis(100)).await;
+            tokio::time::sleep(Duration::from_millis(50)).await;
         }
-        panic!("the job did not end in two minutes");
+        panic!("the job did not get there in two minutes");
     }
 
     /// Returns the number of drafts, those in use and those left by a crash.

@@ -7,6 +7,7 @@ pub(crate) mod pictures;
 pub(crate) mod place;
 pub(crate) mod process;
 pub(crate) mod results;
+pub(crate) mod substitute;
 
 pub(crate) use app::TestApp;
 pub(crate) use place::Place;

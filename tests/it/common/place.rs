@@ -32,6 +32,17 @@ impl Place {
         Place::on(of("FLOCKREEL_TEST_POSTGRES"), of("FLOCKREEL_TEST_BUCKET"))
     }
 
+    /// Returns a place with the database of [`Place::from_environment`], and all files in its folder.
+    pub(crate) fn with_files_in_folder() -> Place {
+        Place::on(std::env::var("FLOCKREEL_TEST_POSTGRES").ok(), None)
+    }
+
+    /// Returns the URL of the database on a server, if it is on one.
+    pub(crate) fn database(&self) -> Option<&str> {
+        let at = self.flags.iter().position(|flag| flag == "--database")?;
+        self.flags.get(at + 1).map(String::as_str)
+    }
+
     /// Returns a place on the servers. Panics if the environment does not name both.
     pub(crate) fn shared() -> Place {
         let place = Place::from_environment();

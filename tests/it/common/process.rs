@@ -168,6 +168,14 @@ impl Server {
         request.send().await.unwrap()
     }
 
+    /// Returns the resident memory of the process, bytes.
+    pub(crate) fn resident_bytes(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+        let kib = line.unwrap().trim().trim_end_matches(" kB");
+        kib.parse::<u64>().unwrap() << 10
+    }
+
     /// Uploads a film and returns the response.
     pub(crate) async fn upload(&self, film: Vec<u8>) -> Response {
         let request = self.client.post(format!("{}/v1/footage", self.base));
@@ -205,6 +213,11 @@ impl Server {
     /// Waits until the job has ended and returns it.
     pub(crate) async fn ended(&self, id: &Value) -> Value {
         self.job_when(id, |job| !job["finished_at"].is_null()).await
+    }
+
+    /// Returns the id of the process.
+    pub(crate) fn pid(&self) -> u32 {
+        self.child.id()
     }
 
     /// Sends SIGKILL and waits for the end.
@@ -261,10 +274,17 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
 /// Returns the command lines of all processes that mention the folder.
 pub(crate) fn processes_of(folder: &Path) -> Vec<String> {
     let folder = folder.to_str().unwrap();
+    let lines = command_lines().into_iter().map(|(_, line)| line);
+    lines.filter(|line| line.contains(folder)).collect()
+}
+
+/// Returns the ids and command lines of all processes.
+pub(crate) fn command_lines() -> Vec<(i32, String)> {
     let entries = std::fs::read_dir("/proc").unwrap().flatten();
     let lines = entries.filter_map(|entry| {
+        let pid = entry.file_name().to_str()?.parse().ok()?;
         let line = std::fs::read(entry.path().join("cmdline")).ok()?;
-        Some(String::from_utf8_lossy(&line).replace('\0', " "))
+        Some((pid, String::from_utf8_lossy(&line).replace('\0', " ")))
     });
-    lines.filter(|line| line.contains(folder)).collect()
+    lines.collect()
 }

@@ -1,11 +1,8 @@
 //! Substitute results: a library, a flock and a virtual fish with the rows and files of real ones, but without
 //! their content. They are made at once.
 
-use flockreel::jobs::Product;
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::store::footage::{Footage, VIDEO};
-use flockreel::store::jobs::Kind;
-use flockreel::store::jobs::finish::Source;
 use flockreel::store::owners::Owner;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
@@ -14,6 +11,7 @@ use uuid::Uuid;
 use super::TestApp;
 use super::app::json_of;
 use super::clip::TINY;
+use super::substitute::{done, with_script};
 
 /// Addresses of a footage and of what was made from it.
 pub(crate) struct Results {
@@ -41,7 +39,7 @@ impl Results {
         let flock = app.accept("/v1/flocks", of_library.clone()).await;
         let fish = app.accept("/v1/fish", of_library).await;
         let library = id(&analysis["library_id"]);
-        work(app, footage.parse().unwrap(), library.parse().unwrap()).await;
+        work(app).await;
         Results {
             footage: format!("/v1/footage/{footage}"),
             library: format!("/v1/libraries/{library}"),
@@ -73,9 +71,12 @@ pub(crate) async fn store_film(app: &TestApp, film: &[u8], sample: bool) -> Stri
         fps: 30.0,
         n_frames_hint: 300,
         sample,
+        pinned: false,
+        used_ms: 0,
         created_ms: 0,
     };
-    store.add_footage(footage, draft, &files).await.unwrap();
+    let added = store.add_footage(footage, draft, &files, None);
+    added.await.unwrap();
     id.to_string()
 }
 
@@ -89,25 +90,16 @@ fn id(value: &Value) -> String {
 }
 
 /// Ends the three queued jobs with substitute results.
-async fn work(app: &TestApp, footage: Uuid, library: Uuid) {
-    let worker = Worker::new(app.context.clone());
-    for _ in 0..3 {
-        let step = worker.step_by(move |lease, attempt| {
-            let (source_id, name, summary) = match lease.kind {
-                Kind::Analysis => (footage, "library.json", library_summary()),
-                Kind::Flock => (library, "flock.json", flock_summary()),
-                Kind::Fish => (library, "video.mp4", fish_summary()),
-                Kind::Sample => unreachable!("a request queues no sample"),
-            };
-            std::fs::write(attempt.folder().join(name), b"{}")?;
-            std::fs::write(attempt.folder().join("poses.csv"), "0,0.0\n".repeat(1000))?;
-            Ok(Product {
-                source: Source::Resource(source_id),
-                params: "{}".to_owned(),
-                summary: summary.to_string(),
-            })
-        });
-        assert!(matches!(step.await.unwrap(), Step::Done(_)));
+async fn work(app: &TestApp) {
+    let poses = "0,0.0\n".repeat(1000);
+    for (name, summary) in [
+        ("library.json", library_summary()),
+        ("flock.json", flock_summary()),
+        ("video.mp4", fish_summary()),
+    ] {
+        let commands = done(&[(name, "{}"), ("poses.csv", &poses)], &summary);
+        let worker = Worker::new(with_script(&app.context, &commands));
+        assert!(matches!(worker.step().await.unwrap(), Step::Done(_)));
     }
 }
 

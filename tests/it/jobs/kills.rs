@@ -141,7 +141,7 @@ async fn jobs_end_once_with_identical_results_after_kills() {
     for _ in 0..3 {
         jobs.push(start_job(&server).await);
     }
-    for kill in 0..3 {
+    for kill in 0..4 {
         tokio::time::sleep(Duration::from_secs_f64(0.1 + 0.9 * uniform(6, &[kill]))).await;
         server.kill();
         server = Server::start_at(&place);
@@ -149,17 +149,14 @@ async fn jobs_end_once_with_identical_results_after_kills() {
     let mut done = Vec::new();
     for job in &jobs {
         let ended = server.ended(job).await;
-        match ended["state"].as_str().unwrap() {
-            "done" => done.push(ended),
-            // A job that was interrupted by two kills is not retried.
-            _ => assert_eq!(ended["error"]["code"], "crashed_worker", "{ended}"),
-        }
+        // None of them ran alone in three of the kills.
+        assert_eq!(ended["state"], "done", "{ended}");
+        done.push(ended);
     }
     let uncrashed = start_job(&server).await;
     let uncrashed = server.ended(&uncrashed).await;
     assert_eq!(uncrashed["attempt"], 1);
     let wanted = result_of(&server, &uncrashed).await;
-    assert!(!done.is_empty(), "three kills cannot meet three jobs twice");
     for job in &done {
         assert_eq!(result_of(&server, job).await, wanted, "{job}");
     }

@@ -1,5 +1,6 @@
 //! The life cycle of jobs: stepped by hand, run by worker pools, interrupted by kills, claimed concurrently.
 
+mod attempts;
 mod durable;
 mod full_disk;
 mod kills;
@@ -9,4 +10,5 @@ mod races;
 mod sample;
 mod steps;
 mod sweeps;
+mod upgrades;
 mod uploads;

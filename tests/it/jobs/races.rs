@@ -33,6 +33,7 @@ fn job(kind: Kind) -> NewJob {
         result_id: Uuid::now_v7(),
         after_job: None,
         priority: 0,
+        is_small: false,
         max_queued: i64::MAX,
     }
 }
@@ -67,9 +68,12 @@ async fn library(store: &Store) -> Uuid {
         fps: 1.0,
         n_frames_hint: 1,
         sample: false,
+        pinned: false,
+        used_ms: 0,
         created_ms: 0,
     };
-    let added = store.add_footage(footage, draft, &files).await.unwrap();
+    let added = store.add_footage(footage, draft, &files, None);
+    let added = added.await.unwrap();
     let (Added::New(footage) | Added::Known(footage)) = added;
     store.enqueue(&job(Kind::Analysis), 0).await.unwrap();
     let lease = store.claim(Uuid::now_v7(), 0, LEASE_MS).await;

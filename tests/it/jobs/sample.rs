@@ -1,15 +1,17 @@
 //! The sample of a new data folder: three ordinary jobs that film, analyze and make a flock.
 
+use std::time::Duration;
+
 use flockreel::jobs::worker::{Step, Worker};
-use flockreel::jobs::{IdSequence, analysis, run, sample};
+use flockreel::jobs::{IdSequence, analysis, sample};
 use flockreel::store::owners::Account;
 use flockreel_core::ids::{FootageId, JobId};
-use flockreel_core::progress::Progress;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 
 use crate::common::TestApp;
 use crate::common::app::code_of;
+use crate::common::substitute::{until_exists, with_program};
 
 /// Queues a sample of 20 frames. Returns the ids of its job and its footage.
 async fn queued(app: &TestApp) -> (JobId, FootageId) {
@@ -66,20 +68,30 @@ async fn a_store_with_footage_is_not_filled() {
 async fn a_sample_that_is_filmed_twice_is_one_footage() {
     let app = TestApp::idle().await;
     let (job, footage_id) = queued(&app).await;
-    let (stale, fresh) = (
-        Worker::new(app.context.clone()),
-        Worker::new(app.context.clone()),
+    // The first attempt tells its end only after the job has been rescued.
+    let outside = tempfile::tempdir().unwrap();
+    let (messages, go_on) = (
+        outside.path().join("messages"),
+        outside.path().join("go-on"),
     );
-    let (store, runtime) = (app.context.store.clone(), tokio::runtime::Handle::current());
-    let lost = stale.step_by(move |lease, attempt| {
-        let product = run(lease, attempt)?;
-        assert_eq!(attempt.listener.position().stage, "filming");
-        assert_eq!(attempt.listener.position().progress, 1.0);
-        assert!(!attempt.listener.cancelled());
-        runtime.block_on(store.rescue_all(0))?;
-        Ok(product)
-    });
+    let program = env!("CARGO_BIN_EXE_flockreel");
+    let commands = format!(
+        "{program} attempt \"$folder\" >{0}.part; mv {0}.part {0}; {1} cat {0}",
+        messages.display(),
+        until_exists(&go_on)
+    );
+    let stale = Worker::new(with_program(&app.context, &commands));
+    let lost = tokio::spawn(async move { stale.step().await.unwrap() });
+    while !messages.exists() {
+        assert!(!lost.is_finished());
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    let told = std::fs::read_to_string(&messages).unwrap();
+    assert!(told.contains(r#"{"progress":["filming",1.0]}"#), "{told}");
+    app.context.store.rescue_all(0).await.unwrap();
+    std::fs::write(&go_on, b"").unwrap();
     assert_eq!(lost.await.unwrap(), Step::Lost(job));
+    let fresh = Worker::new(app.context.clone());
     assert_eq!(fresh.step().await.unwrap(), Step::Done(job));
 
     let film = app.json(&format!("/v1/footage/{footage_id}")).await;

@@ -1,7 +1,7 @@
 //! Kills the service at seeded random times during uploads (docs/explanation/promises.md,
 //! "No upload is lost" and "No orphans"). Each upload answered with 201 is stored byte for byte, the database
 //! is sound, and no leftovers remain. The median start takes less than two seconds. FLOCKREEL_KILLS sets the
-//! number of kills: 20 by default, 200 in `make soak`.
+//! number of kills: 20 by default, 200 in `make kills`.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -11,6 +11,7 @@ use flockreel::jobs::clock::now_ms;
 use flockreel::store::Store;
 use flockreel::store::footage::{Added, VIDEO};
 use flockreel::store::owners::Owner;
+use flockreel::store::space::Counted;
 use reqwest::StatusCode;
 use rustix::process::Signal;
 use serde_json::{Value, json};
@@ -33,6 +34,7 @@ pub(super) async fn admitted(store: &Store) -> Uuid {
         masks: None,
         name: "swim".into(),
         owner: Owner::local(),
+        counted: Counted::Upload(Uuid::nil()),
     };
     let context = Context::new(store.clone(), 1);
     let (Added::New(footage) | Added::Known(footage)) = admit(&context, received).await.unwrap();

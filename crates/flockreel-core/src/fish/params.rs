@@ -18,11 +18,11 @@ pub struct Params {
     pub palette: Palette,
     /// Length from the nose to the tip of the tail, in metres. null = the length of the measured animal,
     /// or 0.10 if it is unknown.
-    #[schema(exclusive_minimum = 0)]
+    #[schema(minimum = 0.000001, maximum = 10000)]
     pub length_m: Option<f64>,
     /// Height of the whole silhouette, fins included, in metres. null = the height of the measured animal,
     /// or 0.47 times the length if it is unknown.
-    #[schema(exclusive_minimum = 0)]
+    #[schema(minimum = 0.000001, maximum = 10000)]
     pub height_m: Option<f64>,
     /// Whether the body bends. false = the rigid fish of Nakajima et al.
     #[default = true]
@@ -110,7 +110,7 @@ mod tests {
             length_m: Some(-0.1),
             ..Params::default()
         };
-        let sentence = "length_m must be above 0: -0.1";
+        let sentence = "length_m must lie in 0.000001..=10000: -0.1";
         assert_eq!(wrong.check(), Err(sentence.into()));
         let wrong = Params {
             bank_rad: f64::NAN,

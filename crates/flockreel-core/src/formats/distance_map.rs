@@ -236,7 +236,8 @@ mod tests {
     fn colors(map: &DistanceMap, transitions: Vec<Transition>) -> Vec<[u8; 3]> {
         let mut library = synthetic::library(View::Side);
         library.transitions = transitions;
-        let image = picture::read_rgb(&map.draw_candidates(&library)).expect("our own PNG");
+        let image =
+            picture::read_rgb(&map.draw_candidates(&library), [1024; 2]).expect("our own PNG");
         let pixels = image.pixels.chunks_exact(3);
         pixels.map(|rgb| [rgb[0], rgb[1], rgb[2]]).collect()
     }

@@ -78,13 +78,13 @@ pub fn write_jpeg(image: &RgbImage) -> Vec<u8> {
     bytes
 }
 
-/// Reads an 8-bit RGB PNG.
-pub fn read_rgb(bytes: &[u8]) -> Result<RgbImage, Error> {
+/// Reads an 8-bit RGB PNG of at most `max_size_px` columns and rows.
+pub fn read_rgb(bytes: &[u8], max_size_px: [u32; 2]) -> Result<RgbImage, Error> {
     let Decoded {
         width,
         height,
         pixels,
-    } = decode(bytes, ColorType::Rgb, [u32::MAX; 2])?;
+    } = decode(bytes, ColorType::Rgb, max_size_px)?;
     Ok(RgbImage {
         width,
         height,
@@ -166,7 +166,10 @@ mod tests {
             .iter_mut()
             .enumerate()
             .for_each(|(k, p)| *p = (k * 29) as u8);
-        assert_eq!(read_rgb(&write_rgb(&rgb)).expect("our own PNG"), rgb);
+        let bytes = write_rgb(&rgb);
+        assert_eq!(read_rgb(&bytes, [5, 3]).expect("our own PNG"), rgb);
+        let larger = read_rgb(&bytes, [4, 3]);
+        assert!(matches!(larger, Err(Error::TooLarge { .. })));
         let mut rgba = RgbaImage::new(3, 4);
         rgba.pixels
             .iter_mut()
@@ -177,7 +180,7 @@ mod tests {
         let larger = read_rgba(&bytes, [3, 3]);
         assert!(matches!(larger, Err(Error::TooLarge { .. })));
         assert!(matches!(
-            read_rgb(&bytes),
+            read_rgb(&bytes, [3, 4]),
             Err(Error::Kind { wanted: "RGB", .. })
         ));
     }

@@ -81,7 +81,21 @@ pub fn entries(
             n_bytes: entry.size() as usize,
         });
     }
+    check_overlap(&entries)?;
     Ok(entries)
+}
+
+/// Checks that no two entries share bytes. A small archive could otherwise expand to any number of pictures.
+fn check_overlap(entries: &[Option<Entry>]) -> Result<(), Error> {
+    let mut spans: Vec<(u64, usize)> = (entries.iter().flatten())
+        .map(|entry| (entry.at, entry.n_bytes))
+        .collect();
+    spans.sort_unstable();
+    let overlap = |pair: &[(u64, usize)]| pair[0].0 + pair[0].1 as u64 > pair[1].0;
+    if spans.windows(2).any(overlap) {
+        return Err(Error::Mismatch("entries of the archive overlap"));
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -107,5 +121,14 @@ mod tests {
         assert!(matches!(read(40, 4), Err(Error::Mismatch(_))));
         let cut_off = entries(Cursor::new(&bytes[..50]), 50, 4);
         assert!(matches!(cut_off, Err(Error::Zip(_))));
+    }
+
+    #[test]
+    fn entries_that_share_bytes_are_refused() {
+        let entry = |at, n_bytes| Some(Entry { at, n_bytes });
+        assert!(check_overlap(&[entry(10, 5), None, entry(4, 6), entry(15, 0)]).is_ok());
+        for overlapping in [[entry(4, 6), entry(4, 6)], [entry(9, 1), entry(4, 6)]] {
+            assert!(check_overlap(&overlapping).is_err(), "{overlapping:?}");
+        }
     }
 }

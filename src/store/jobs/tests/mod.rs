@@ -1,7 +1,9 @@
 //! Tests of the transitions on a real database (docs/explanation/promises.md, "No job is lost", "Stalled
 //! workers cannot overwrite" and "Poison jobs"). Times are arguments, so nothing sleeps.
 
-mod owners; // fair queue and quotas
+mod crashes; // rescue and quarantine
+mod owners; // fair queue, small jobs and quotas
+mod retries; // another attempt, by a user
 
 use tempfile::TempDir;
 
@@ -9,6 +11,8 @@ use super::cancel::Cancel;
 use super::enqueue::NewJob;
 use super::finish::{Outcome, Source};
 use super::heartbeat::Beat;
+use super::read::JobRow;
+use super::requeue::End;
 use super::*;
 use crate::store::Store;
 use crate::store::owners::{Account, Owner, OwnerFilter};
@@ -17,6 +21,8 @@ use crate::store::{fresh, sql};
 use flockreel_core::code::Code;
 
 const LEASE_MS: i64 = 15_000;
+/// Id of the process that rescues.
+const ALIVE: Uuid = Uuid::nil();
 
 struct Queue {
     store: Store,
@@ -45,19 +51,13 @@ impl Queue {
         after_job: Option<JobId>,
         priority: i64,
     ) -> Result<JobId, Error> {
-        let job_id = JobId(Uuid::now_v7());
         let job = NewJob {
-            job_id,
-            account,
-            kind: Kind::Fish,
-            input: "{}".into(),
-            result_id: Uuid::now_v7(),
             after_job,
             priority,
-            max_queued: 1_000,
+            ..new_job(account)
         };
         self.store.enqueue(&job, 0).await?;
-        Ok(job_id)
+        Ok(job.job_id)
     }
 
     async fn claim(&self, now_ms: i64) -> Option<Lease> {
@@ -65,13 +65,20 @@ impl Queue {
         self.store.claim(worker, now_ms, LEASE_MS).await.unwrap()
     }
 
+    /// Rescues the jobs whose leases ended before `now_ms`.
+    async fn rescue(&self, now_ms: i64) -> Vec<(JobId, JobState)> {
+        let mut ended = self.store.held_leases().await.unwrap();
+        ended.retain(|lease| lease.until_ms < now_ms);
+        self.store.rescue(ALIVE, &ended, now_ms).await.unwrap()
+    }
+
     async fn state(&self, job: JobId) -> JobState {
-        self.store
-            .job(job, &OwnerFilter::All)
-            .await
-            .unwrap()
-            .unwrap()
-            .state
+        self.row(job).await.state
+    }
+
+    async fn row(&self, job: JobId) -> JobRow {
+        let row = self.store.job(job, &OwnerFilter::All).await;
+        row.unwrap().unwrap()
     }
 
     /// Finishes a job with a result without files, made from a library that is added for it.
@@ -113,6 +120,20 @@ impl Queue {
     }
 }
 
+fn new_job(account: Account) -> NewJob {
+    NewJob {
+        job_id: JobId(Uuid::now_v7()),
+        account,
+        kind: Kind::Fish,
+        input: "{}".into(),
+        result_id: Uuid::now_v7(),
+        after_job: None,
+        priority: 0,
+        is_small: false,
+        max_queued: 1_000,
+    }
+}
+
 #[tokio::test]
 async fn jobs_are_claimed_once_by_priority_and_age() {
     let queue = Queue::open().await;
@@ -133,8 +154,8 @@ async fn heartbeat_prevents_rescue() {
     let lease = queue.claim(0).await.unwrap();
     let beat = queue.store.heartbeat(&lease, 40_000, "tracking", 0.5).await;
     assert_eq!(beat.unwrap(), Beat::Held);
-    assert_eq!(queue.store.rescue(39_000).await.unwrap(), []);
-    let rescued = queue.store.rescue(40_001).await.unwrap();
+    assert_eq!(queue.rescue(39_000).await, []);
+    let rescued = queue.rescue(40_001).await;
     assert_eq!(rescued, [(lease.job_id, JobState::Queued)]);
 }
 
@@ -159,14 +180,15 @@ async fn worker_with_an_old_fence_changes_nothing() {
     let queue = Queue::open().await;
     let job = queue.enqueue(None).await;
     let stale = queue.claim(0).await.unwrap();
-    queue.store.rescue(LEASE_MS + 1).await.unwrap();
+    queue.rescue(LEASE_MS + 1).await;
     let fresh = queue.claim(LEASE_MS + 1).await.unwrap();
 
     assert_eq!(queue.finish(&stale).await, Change::Lost);
     let failed = queue.store.fail(&stale, Code::Internal, "", None, 0).await;
     assert_eq!(failed.unwrap(), Change::Lost);
     assert_eq!(queue.store.stop(&stale, 0).await.unwrap(), Change::Lost);
-    assert_eq!(queue.store.retry(&stale, 0).await.unwrap(), Change::Lost);
+    let requeued = queue.store.requeue(&stale, End::Crash, 0).await;
+    assert_eq!(requeued.unwrap(), Change::Lost);
     assert_eq!(queue.store.release(&stale).await.unwrap(), Change::Lost);
     let beat = queue.store.heartbeat(&stale, i64::MAX, "", 0.0).await;
     assert_eq!(beat.unwrap(), Beat::Lost);
@@ -178,42 +200,19 @@ async fn worker_with_an_old_fence_changes_nothing() {
 }
 
 #[tokio::test]
-async fn rescued_job_keeps_its_attempt_count() {
-    let queue = Queue::open().await;
-    queue.enqueue(None).await;
-    queue.claim(0).await.unwrap();
-    queue.store.rescue_all(1).await.unwrap();
-    assert_eq!(queue.claim(1).await.unwrap().attempt, 2);
-}
-
-#[tokio::test]
-async fn job_is_quarantined_after_two_crashes() {
-    let queue = Queue::open().await;
-    let job = queue.enqueue(None).await;
-    for _ in 0..2 {
-        queue.claim(0).await.unwrap();
-        queue.store.rescue_all(1).await.unwrap();
-    }
-    let row = queue
-        .store
-        .job(job, &OwnerFilter::All)
-        .await
-        .unwrap()
-        .unwrap();
-    assert_eq!(row.state, JobState::Failed);
-    assert_eq!(row.failure().unwrap().code, Code::CrashedWorker);
-    assert_eq!(queue.claim(i64::MAX - LEASE_MS).await, None);
-}
-
-#[tokio::test]
-async fn retried_job_waits_and_counts_the_attempt() {
+async fn requeued_job_waits_and_counts_the_attempt_and_its_end() {
     let queue = Queue::open().await;
     queue.enqueue(None).await;
     let lease = queue.claim(0).await.unwrap();
-    let retried = queue.store.retry(&lease, 2_000).await.unwrap();
-    assert_eq!(retried, Change::Made);
+    let requeued = queue.store.requeue(&lease, End::Crash, 2_000).await;
+    assert_eq!(requeued.unwrap(), Change::Made);
     assert_eq!(queue.claim(1_999).await, None);
-    assert_eq!(queue.claim(2_000).await.unwrap().attempt, 2);
+    let lease = queue.claim(2_000).await.unwrap();
+    let counts = |lease: &Lease| (lease.attempt, lease.own_crashes, lease.transient_ends);
+    assert_eq!(counts(&lease), (2, 1, 0));
+    let requeued = queue.store.requeue(&lease, End::Transient, 0).await;
+    assert_eq!(requeued.unwrap(), Change::Made);
+    assert_eq!(counts(&queue.claim(2_000).await.unwrap()), (3, 1, 1));
 }
 
 #[tokio::test]
@@ -259,19 +258,6 @@ async fn heartbeat_reports_a_cancel_request() {
     let beat = queue.store.heartbeat(&lease, 1, "", 0.0).await.unwrap();
     assert_eq!(beat, Beat::CancelRequested);
     assert_eq!(queue.store.stop(&lease, 2).await.unwrap(), Change::Made);
-    assert_eq!(queue.state(job).await, JobState::Cancelled);
-}
-
-#[tokio::test]
-async fn rescue_cancels_a_job_with_a_cancel_request() {
-    let queue = Queue::open().await;
-    let job = queue.enqueue(None).await;
-    queue.claim(0).await.unwrap();
-    assert_eq!(
-        queue.store.cancel(job, &OwnerFilter::All, 1).await.unwrap(),
-        Cancel::Requested
-    );
-    queue.store.rescue_all(2).await.unwrap();
     assert_eq!(queue.state(job).await, JobState::Cancelled);
 }
 

@@ -1,5 +1,6 @@
-//! Tests of the queue with several owners: the fair queue and quotas (docs/explanation/promises.md, "Fair queue").
+//! Tests of the queue with several owners: the fair queue, small jobs and quotas (docs/explanation/promises.md, "Fair queue").
 
+use super::claim::Lane;
 use super::*;
 
 fn of(owner: &str, quota: i64) -> Account {
@@ -69,4 +70,44 @@ async fn quota_limits_queued_and_running_jobs() {
     queue.charge(of("b", 1), None, 0).await.unwrap();
     assert_eq!(queue.finish(&lease).await, Change::Made);
     charge().await.unwrap();
+}
+
+impl Queue {
+    async fn enqueue_small(&self, owner: &str) -> JobId {
+        let job = NewJob {
+            is_small: true,
+            ..new_job(of(owner, 9))
+        };
+        self.store.enqueue(&job, 0).await.unwrap();
+        job.job_id
+    }
+}
+
+#[tokio::test]
+async fn small_jobs_go_before_the_others_of_their_owner_only() {
+    let queue = Queue::open().await;
+    let large = queue.charge(of("a", 9), None, 0).await.unwrap();
+    let small = queue.enqueue_small("a").await;
+    let other = queue.charge(of("b", 9), None, 0).await.unwrap();
+    let mut turns = Vec::new();
+    for now_ms in 1..=3 {
+        let lease = queue.claim(now_ms).await.unwrap();
+        turns.push(lease.job_id);
+        assert_eq!(queue.finish(&lease).await, Change::Made);
+    }
+    assert_eq!(turns, [small, other, large]);
+}
+
+#[tokio::test]
+async fn short_lane_is_for_small_jobs() {
+    let queue = Queue::open().await;
+    let large = queue.charge(of("a", 9), None, 0).await.unwrap();
+    let claim = async |lane| {
+        let claimed = queue.store.claim_in(lane, Uuid::now_v7(), 1, LEASE_MS);
+        claimed.await.unwrap().map(|lease| lease.job_id)
+    };
+    assert_eq!(claim(Lane::Short).await, None);
+    let small = queue.enqueue_small("b").await;
+    assert_eq!(claim(Lane::Short).await, Some(small));
+    assert_eq!(claim(Lane::All).await, Some(large));
 }

@@ -5,6 +5,7 @@ use utoipa::ToSchema;
 
 use super::Params;
 use crate::geometry::Rect;
+use crate::parameters::CoordinatePx;
 
 /// The position of the animal in one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -14,7 +15,7 @@ pub struct AnimalAtParam {
     pub frame: u32,
     /// A point on the animal, pixels.
     #[serde(alias = "point")]
-    #[schema(min_items = 2, max_items = 2)]
+    #[schema(value_type = [CoordinatePx; 2], inline, min_items = 2, max_items = 2)]
     pub at_px: [f64; 2],
 }
 
@@ -27,11 +28,11 @@ pub struct IgnoreParam {
     pub box_px: [u32; 4],
     /// Start time, seconds. null = from the start of the footage.
     #[serde(default)]
-    #[schema(default = json!(null), minimum = 0)]
+    #[schema(default = json!(null), minimum = 0, maximum = 1000000)]
     pub from_s: Option<f64>,
     /// End time, seconds. null = to the end of the footage.
     #[serde(default)]
-    #[schema(default = json!(null), exclusive_minimum = 0)]
+    #[schema(default = json!(null), exclusive_minimum = 0, maximum = 1000000)]
     pub to_s: Option<f64>,
 }
 

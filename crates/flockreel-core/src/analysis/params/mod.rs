@@ -12,7 +12,7 @@ pub use hints::{AnimalAtParam, IgnoreParam};
 use super::similarity::distance::Clip;
 use crate::geometry::Camera;
 use crate::library::{Animal, View};
-use crate::parameters::Parameters;
+use crate::parameters::{CoordinatePx, Parameters};
 
 /// Parameters of an analysis. All have defaults.
 #[derive(Clone, Debug, PartialEq, SmartDefault, Serialize, Deserialize, ToSchema)]
@@ -28,10 +28,10 @@ pub struct Params {
     pub pixel_aspect: Option<f64>,
     /// Start of the measured part, seconds from the first frame of the file. null = the first frame. Frames
     /// keep their numbers and times in the film; those before have no animal.
-    #[schema(minimum = 0)]
+    #[schema(minimum = 0, maximum = 1000000)]
     pub from_s: Option<f64>,
     /// End of the measured part, seconds from the first frame of the file. null = the last frame.
-    #[schema(exclusive_minimum = 0)]
+    #[schema(exclusive_minimum = 0, maximum = 1000000)]
     pub to_s: Option<f64>,
     /// Position of the animal in one frame. The analysis follows the object there, whatever else moves.
     pub animal_at: Option<AnimalAtParam>,
@@ -70,11 +70,12 @@ pub struct Params {
     #[default(ClipWeights::Uniform)]
     pub clip_weights: ClipWeights,
     /// Distance below which two clips are similar. null = `kappa` times the natural step.
+    #[schema(maximum = 1000000000000000000u64)]
     pub epsilon: Option<u64>,
     /// Multiple of the natural step that gives `epsilon` when that is null. If playback is then too short,
     /// the analysis tries larger values.
     #[default = 2.0]
-    #[schema(exclusive_minimum = 0)]
+    #[schema(exclusive_minimum = 0, maximum = 1000000)]
     pub kappa: f64,
     /// Largest difference between the mean headings of two similar clips in side view, degrees.
     #[default = 15.0]
@@ -121,18 +122,18 @@ pub enum ViewParam {
 #[serde(deny_unknown_fields)]
 pub struct CameraParams {
     /// Distance from the camera to the front pane, metres.
-    #[schema(exclusive_minimum = 0)]
+    #[schema(minimum = 0.000001, maximum = 10000)]
     pub z_min_m: f64,
     /// Pixels per metre on the pane.
-    #[schema(exclusive_minimum = 0)]
+    #[schema(minimum = 0.000001, maximum = 1000000000)]
     pub pane_px_per_m: f64,
     /// Image point on the optical axis, pixels. null = the center of the image.
     #[serde(default)]
-    #[schema(default = json!(null), min_items = 2, max_items = 2)]
+    #[schema(value_type = Option<[CoordinatePx; 2]>, inline, default = json!(null), min_items = 2, max_items = 2)]
     pub center_px: Option<[f64; 2]>,
     /// Refractive index behind the pane: 1 for air (Nakajima et al.), 1.333 for water.
     #[serde(default = "air")]
-    #[schema(default = air, exclusive_minimum = 0)]
+    #[schema(default = air, minimum = 0.1, maximum = 10)]
     pub medium_index: f64,
 }
 
@@ -141,10 +142,10 @@ pub struct CameraParams {
 #[serde(deny_unknown_fields)]
 pub struct AnimalParams {
     /// Length from the nose to the tip of the tail, metres.
-    #[schema(exclusive_minimum = 0)]
+    #[schema(minimum = 0.000001, maximum = 10000)]
     pub length_m: f64,
     /// Height of the silhouette, fins included, metres.
-    #[schema(exclusive_minimum = 0)]
+    #[schema(minimum = 0.000001, maximum = 10000)]
     pub height_m: f64,
 }
 
@@ -155,7 +156,7 @@ pub struct HeadParam {
     /// Frame number, counted from 0.
     pub frame: u32,
     /// A point nearer to the head than to the tail, pixels.
-    #[schema(min_items = 2, max_items = 2)]
+    #[schema(value_type = [CoordinatePx; 2], inline, min_items = 2, max_items = 2)]
     pub point: [f64; 2],
 }
 
@@ -281,7 +282,7 @@ impl Params {
 
     /// Returns the largest clip length, frames. Binomial coefficients of longer clips would overflow the
     /// distances.
-    fn max_clip_frames(&self) -> u32 {
+    pub(crate) fn max_clip_frames(&self) -> u32 {
         match self.clip_weights {
             ClipWeights::Uniform => 120,
             ClipWeights::Binomial => 24,

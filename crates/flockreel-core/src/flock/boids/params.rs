@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 use smart_default::SmartDefault;
 use utoipa::ToSchema;
 
+use crate::parameters::CoordinatePx;
+
 /// Steering of the boids (docs/explanation/algorithms.md, "Boids").
 #[derive(Clone, Debug, PartialEq, SmartDefault, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -168,12 +170,6 @@ pub struct Waypoint {
 fn usual_weight() -> f64 {
     1.0
 }
-
-/// Schema of a coordinate in the image of the footage, pixels. The limits are a free choice.
-#[derive(ToSchema)]
-#[schema(minimum = -100000, maximum = 100000)]
-#[expect(dead_code, reason = "it only describes numbers in the schema")]
-struct CoordinatePx(f64);
 
 impl Rules {
     /// Returns the largest radius of all rules, body lengths.

@@ -3,17 +3,20 @@
 //! A flock holds rounded numbers, so reading returns exactly what was written. Each plan's cost can be
 //! recomputed from this file and the library (docs/explanation/algorithms.md, "Planning").
 
+mod limits; // of the numbers in a file
 mod space; // the tank and how it is seen
 mod stats; // quality of the flock, and its order in every frame
 
 use std::io::{self, Write};
 
+use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
 
 use self::space::SpaceFile;
 use self::stats::StatsFile;
 use crate::flock::individual::MotionState;
 use crate::flock::{BoidTrack, Fade, Flock, Individual, Params, PlanCost};
+use crate::parameters::Parameters;
 
 /// Name and version of the schema.
 pub const SCHEMA: &str = "flockreel/flock@2";
@@ -57,10 +60,10 @@ pub(super) fn stats(flock: &Flock) -> serde_json::Value {
     serde_json::to_value(file).expect("plain values serialise")
 }
 
-/// Parses the output of `write`.
+/// Parses the output of `write`. Fails if a number is beyond what a flock can have.
 pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
     let file: FlockFile<Vec<IndividualFile>> = serde_json::from_slice(bytes)?;
-    Ok(Flock {
+    let flock = Flock {
         fps: file.fps,
         image_size_px: file.image_size_px,
         length_px: file.length_px,
@@ -74,7 +77,9 @@ pub fn read(bytes: &[u8]) -> Result<Flock, serde_json::Error> {
             .collect(),
         orders: file.stats.orders()?,
         stats: file.stats.stats,
-    })
+    };
+    let checked = limits::check(&flock).and_then(|()| flock.params.check());
+    checked.map(|()| flock).map_err(serde_json::Error::custom)
 }
 
 #[derive(Serialize, Deserialize)]
@@ -274,5 +279,48 @@ mod tests {
         let (from, to) = (from.unwrap(), to.unwrap());
         let before = [&text[..from], &text[to..]].concat();
         assert!(read(before.as_bytes()).unwrap().orders.is_empty());
+    }
+
+    #[test]
+    fn numbers_beyond_any_flock_are_refused_by_name() {
+        let library = synthetic::library(View::Side);
+        let params = Params {
+            count: Some(1),
+            frames: 3,
+            ..Params::default()
+        };
+        let flock = plan_flock(&library, &params, &Silent).unwrap();
+        let file: serde_json::Value = serde_json::from_slice(&write(&flock)).unwrap();
+        for (pointer, value, sentence) in [
+            ("/fps", 1e308, "fps is out of range"),
+            ("/length_px", 0.0, "length_px is out of range"),
+            ("/space/camera/focal_px", 0.0, "space is out of range"),
+            (
+                "/individuals/0/scale/1",
+                1e308,
+                "individuals is out of range",
+            ),
+            (
+                "/individuals/0/centroid_px/2/0",
+                -1e308,
+                "individuals is out of range",
+            ),
+            (
+                "/individuals/0/boid/speed/0",
+                -1.0,
+                "individuals is out of range",
+            ),
+            (
+                "/individuals/0/cost/total",
+                1e300,
+                "individuals is out of range",
+            ),
+            ("/params/variation", 1e308, "variation must lie in"),
+        ] {
+            let mut file = file.clone();
+            *file.pointer_mut(pointer).expect(pointer) = value.into();
+            let error = read(file.to_string().as_bytes()).unwrap_err().to_string();
+            assert!(error.starts_with(sentence), "{pointer}: {error}");
+        }
     }
 }

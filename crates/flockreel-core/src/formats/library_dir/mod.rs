@@ -10,6 +10,7 @@
 //! file system.
 
 mod archive;
+mod limits;
 
 use std::fs;
 use std::io;
@@ -17,10 +18,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use self::archive::Archive;
-use super::library_json::{self, FootageSummary, Summary};
+use super::library_json::{self, FootageSummary};
 use super::{picture, poses_json};
 use crate::analysis::Params;
-use crate::library::{Library, Shadow, Sprites};
+use crate::library::{Library, Sprites};
 use crate::raster::RgbaImage;
 use crate::scratch::{Full, Scratch};
 
@@ -62,6 +63,9 @@ pub enum Error {
     /// The scratch for the mattes is full.
     #[error(transparent)]
     Full(#[from] Full),
+    /// A value is out of its range.
+    #[error("out of range: {0}")]
+    OutOfRange(&'static str),
     /// The files contradict each other.
     #[error("the files do not belong together: {0}")]
     Mismatch(&'static str),
@@ -85,6 +89,9 @@ const MATTES: &str = "mattes.zip";
 const SPRITES: &str = "sprites.zip";
 /// Maximum width and height of the pictures in a library, pixels. Free choice.
 const MAX_SIDE_PX: u32 = 16384;
+/// Maximum size of a picture in a library, pixels. A few bytes can claim more than the memory holds. Free choice: sixteen
+/// times the size of the largest footage.
+const MAX_PIXELS: u64 = 1 << 27;
 /// Files from which a library is read; the folder may hold others. One of the archives is sufficient, and
 /// only some libraries have occluders.
 pub const FILES: [&str; 6] = [LIBRARY, POSES, BACKGROUND, OCCLUDERS, MATTES, SPRITES];
@@ -139,12 +146,13 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
     let json = |file| move |cause| Error::Json { file, cause };
     let summary = library_json::read(&read_file(LIBRARY)?).map_err(json(LIBRARY))?;
     let poses = poses_json::read(&read_file(POSES)?).map_err(json(POSES))?;
-    let background =
-        picture::read_rgb(&read_file(BACKGROUND)?).map_err(|cause| Error::Picture {
-            file: BACKGROUND,
-            cause,
-        })?;
-    if poses.image_size_px != [background.width, background.height] {
+    limits::check(&summary, &poses)?;
+    let background = picture::read_rgb(&read_file(BACKGROUND)?, poses.image_size_px);
+    let background = background.map_err(|cause| Error::Picture {
+        file: BACKGROUND,
+        cause,
+    })?;
+    if poses.image_size_px != background.size() {
         return Err(Error::Mismatch(
             "background.png and poses.json differ in size",
         ));
@@ -152,10 +160,9 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
     let occluders = (summary.occluders)
         .then(|| read_occluders(dir, poses.image_size_px))
         .transpose()?;
-    check(&summary, poses.frames.len())?;
     let archive = Archive::open(dir, &summary)?;
     let max_size_px = match archive.centers_px {
-        Some(_) => poses.image_size_px.map(|side| side.min(MAX_SIDE_PX)),
+        Some(_) => poses.image_size_px,
         None => summary.sprite_size_px,
     };
     let mattes = archive.mattes(poses.frames.len(), max_size_px, &*scratch)?;
@@ -200,49 +207,10 @@ fn read_occluders(dir: &Path, size_px: [u32; 2]) -> Result<RgbaImage, Error> {
     }
 }
 
-/// Checks that library.json is valid for `n_frames` frames.
-fn check(summary: &Summary, n_frames: usize) -> Result<(), Error> {
-    let jumps = summary.playback.jumps.iter().flat_map(|j| [j.from, j.to]);
-    let component = summary.playback.component.iter().copied();
-    if jumps
-        .chain(component)
-        .any(|frame| frame as usize >= n_frames)
-    {
-        return Err(Error::Mismatch(
-            "library.json names a frame that poses.json does not have",
-        ));
-    }
-    let is_sound = |&scale: &f64| (0.01..=100.0).contains(&scale);
-    let scales = summary.sprite_scale.as_deref();
-    if scales.is_some_and(|all| all.len() != n_frames || !all.iter().all(is_sound)) {
-        return Err(Error::Mismatch(
-            "sprite_scale in library.json must have one value from 0.01 to 100 per frame",
-        ));
-    }
-    let is_shadow = |shadow: &Shadow| {
-        (0.0..=1.0).contains(&shadow.darkness)
-            && shadow.offset_bl.iter().all(|bl| bl.abs() <= 1.0)
-            && (0.0..=1.0).contains(&shadow.blur_bl)
-    };
-    if !summary.shadow.as_ref().is_none_or(is_shadow) {
-        return Err(Error::Mismatch(
-            "the shadow in library.json is out of range",
-        ));
-    }
-    let mut sides_px = summary.sprite_size_px.iter();
-    if sides_px.all(|side| (1..=MAX_SIDE_PX).contains(side)) {
-        Ok(())
-    } else {
-        Err(Error::Mismatch(
-            "the sprite size in library.json is out of range",
-        ))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::library::{Jump, LibraryStats, Playback, Pose, Poses, Transition, View};
+    use crate::library::{Jump, LibraryStats, Playback, Pose, Poses, Shadow, Transition, View};
     use crate::raster::RgbImage;
     use crate::scratch::InMemory;
 
@@ -353,7 +321,7 @@ mod tests {
         for size in ["[0,8]", "[8,70000]"] {
             let size = format!(r#""sprite_size_px":{size}"#);
             let read = of(r#""sprite_size_px":[8,8]"#, &size);
-            assert!(matches!(read, Err(Error::Mismatch(_))));
+            assert!(matches!(read, Err(Error::OutOfRange(_))));
         }
         let small = picture::write_rgba(8, 8, &[0; 256]);
         fs::write(dir.path().join(OCCLUDERS), small).expect("written");

@@ -1,0 +1,130 @@
+//! What a worker and the process of an attempt tell each other, one line of JSON each: the order on the child's
+//! stdin, then progress and the end of the attempt on its stdout.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::jobs::Error;
+use crate::media::FoundTools;
+use crate::store::BlobFile;
+use flockreel_core::formats::library_json::FootageSummary;
+use flockreel_core::ids::JobId;
+
+/// Everything that the child needs, except the folder for its files, which is its argument.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Order {
+    /// Id of the job, for the log.
+    pub(super) job_id: JobId,
+    /// Number of the attempt, for the log.
+    pub(super) attempt: i64,
+    /// Kind of the job.
+    pub(super) kind: String,
+    /// Input of the job, JSON.
+    pub(super) input: String,
+    /// Folder with the files of the footage or library that the job works on; empty for a sample.
+    pub(super) subject: PathBuf,
+    /// Hash and size of the footage that the job works on; `None` for jobs of other kinds.
+    pub(super) footage: Option<FootageSummary>,
+    /// Number of threads to use.
+    pub(super) threads: usize,
+    /// Limit of the memory, bytes.
+    pub(super) memory_bytes: u64,
+    /// The media tools.
+    pub(super) tools: FoundTools,
+}
+
+/// A line of the child.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Message {
+    /// Stage, and completed share of the stage, 0..=1.
+    Progress(String, f64),
+    /// Number of decoded frames, and the seconds that they took.
+    Decoded(u64, f64),
+    /// The last line.
+    End(End),
+}
+
+/// How an attempt ended.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum End {
+    /// The files are complete and synced.
+    Done(Product, Vec<File>),
+    /// There is no result.
+    Failed(Failure),
+}
+
+/// Result of an attempt, besides its files.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Product {
+    /// The film, if the job makes footage.
+    pub film: Option<Film>,
+    /// All parameters, JSON.
+    pub params: String,
+    /// Summary for overviews, JSON.
+    pub summary: String,
+}
+
+/// Format of a film that a job makes.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Film {
+    /// Width in square pixels.
+    pub width: u32,
+    /// Height in square pixels.
+    pub height: u32,
+    /// Frame rate, frames per second.
+    pub fps: f64,
+    /// Number of frames.
+    pub n_frames: usize,
+}
+
+/// A file of the result.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct File {
+    name: String,
+    size_bytes: i64,
+    sha256: Vec<u8>,
+}
+
+/// Reason why an attempt has no result. A picture that shows it is in the folder of the attempt.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Failure {
+    /// Stable code.
+    pub(super) code: String,
+    /// Description for people.
+    pub(super) sentence: String,
+    /// Whether another attempt may succeed.
+    pub(super) is_transient: bool,
+}
+
+impl From<&Error> for Failure {
+    fn from(error: &Error) -> Failure {
+        Failure {
+            code: error.code().name().to_owned(),
+            sentence: error.to_string(),
+            is_transient: error.is_transient(),
+        }
+    }
+}
+
+impl From<BlobFile> for File {
+    fn from(file: BlobFile) -> File {
+        File {
+            name: file.name,
+            size_bytes: file.size_bytes,
+            sha256: file.sha256,
+        }
+    }
+}
+
+impl From<File> for BlobFile {
+    fn from(file: File) -> BlobFile {
+        BlobFile {
+            name: file.name,
+            size_bytes: file.size_bytes,
+            sha256: file.sha256,
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! The worker's side of an attempt: starts the child process, follows it, and judges how it ended
+//! (docs/explanation/promises.md, "Poison jobs"). Only `media/gate` and this file start processes.
+
+use std::ffi::OsString;
+use std::io;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::pin::pin;
+use std::process::{Command, ExitStatus, Stdio};
+use std::time::Duration;
+
+use tokio::io::{AsyncBufReadExt, AsyncReadExt, AsyncWriteExt, BufReader};
+use tokio::net::unix::pipe::{Receiver, Sender};
+use tokio::task::spawn_blocking;
+use tokio::time::timeout;
+use tokio_util::task::AbortOnDropHandle;
+use tracing::Instrument;
+use uuid::Uuid;
+
+use super::message::{End, Failure, File, Message, Order};
+use super::{Film, Product};
+use crate::jobs::error::FailedAttempt;
+use crate::jobs::sample::FILM_NAME;
+use crate::jobs::{Context, Error, Listener, Subject, refusal, subject};
+use crate::store::blobs::hex;
+use crate::store::footage::{BACKGROUND, Footage, MASKS, SampleFootage, VIDEO};
+use crate::store::jobs::Lease;
+use crate::store::jobs::finish::{Outcome, Source};
+use crate::store::owners::OwnerFilter;
+use crate::store::resources::{Library, Resource};
+use crate::store::{Draft, Fetched};
+use crate::{logging, media};
+use flockreel_core::code::Code;
+use flockreel_core::formats::library_dir;
+use flockreel_core::formats::library_json::FootageSummary;
+
+/// Time for a child to end after it was asked to, or after it closed its output. Then its group is killed. Free
+/// choice; a computation looks several times per second whether it is to stop.
+const STOP_GRACE: Duration = Duration::from_secs(5);
+/// Maximum length of a line of a child, bytes. Free choice; a summary has a few kilobytes.
+const MAX_LINE_BYTES: u64 = 4 << 20;
+/// What the standard library says before it aborts a process that has run out of memory.
+const OUT_OF_MEMORY: &[u8] = b"memory allocation of ";
+
+/// The files that an attempt works on. Copies are removed on drop.
+struct SubjectFiles {
+    /// Id of the footage or library; `None` for a sample, which is made of nothing.
+    id: Option<Uuid>,
+    files: Option<Fetched>,
+    footage: Option<FootageSummary>,
+}
+
+/// Computes a job in a child process and stores its files. If the future is dropped, the child is killed.
+pub(in crate::jobs) async fn compute(
+    context: &Context,
+    lease: &Lease,
+    listener: &Listener,
+) -> Result<Outcome, Error> {
+    let subject = tokio::select! {
+        fetched = fetch_subject(context, lease) => fetched?,
+        () = listener.stopped() => return Err(Error::Cancelled),
+    };
+    let blobs = context.store.blobs();
+    let draft = blobs.draft(&format!("{}.{}", lease.job_id, lease.fence))?;
+    let (product, files) = match compute_in(context, lease, listener, &subject, &draft).await {
+        Ok(done) => done,
+        Err(error) => {
+            // A draft can have thousands of files.
+            spawn_blocking(move || drop(draft)).await.ok();
+            return Err(error);
+        }
+    };
+    let source = match (product.film, subject.id) {
+        (Some(film), _) => Source::Sample(film.into()),
+        (None, Some(id)) => Source::Resource(id),
+        (None, None) => return Err(io::Error::other("a sample has no film").into()),
+    };
+    // The fence in the name prevents two attempts from sharing a folder.
+    let (kind, result_id, fence) = (lease.kind.result_kind(), lease.result_id, lease.fence);
+    let folder = format!("{}/{result_id}.{fence}", kind.plural());
+    blobs.adopt(draft, &folder).await?;
+    Ok(Outcome {
+        source,
+        folder,
+        files: files.into_iter().map(Into::into).collect(),
+        params: product.params,
+        summary: product.summary,
+    })
+}
+
+/// Finds the footage or library of a job, and makes its files local.
+async fn fetch_subject(context: &Context, lease: &Lease) -> Result<SubjectFiles, Error> {
+    let store = &context.store;
+    let subject = subject(lease.kind, &lease.input)?;
+    let Some(subject) = subject else {
+        return Ok(SubjectFiles {
+            id: None,
+            files: None,
+            footage: None,
+        });
+    };
+    let (files, footage) = match subject {
+        Subject::Footage(id) => {
+            let row = row::<Footage>(context, id.0).await?;
+            let files = store.fetch(&row.folder, &[VIDEO, BACKGROUND, MASKS]).await;
+            let footage = FootageSummary {
+                sha256: hex(&row.sha256),
+                n_bytes: row.size_bytes.unsigned_abs(),
+            };
+            (files?, Some(footage))
+        }
+        Subject::Library(id) => {
+            let row = row::<Library>(context, id.0).await?;
+            (store.fetch(&row.folder, &library_dir::FILES).await?, None)
+        }
+    };
+    Ok(SubjectFiles {
+        id: Some(subject.id()),
+        files: Some(files),
+        footage,
+    })
+}
+
+async fn row<R: Resource>(context: &Context, id: Uuid) -> Result<R::Row, Error> {
+    let row = context.store.resource::<R>(id, &OwnerFilter::All).await?;
+    row.ok_or(Error::InputAbsent(id))
+}
+
+/// Runs the child, which leaves its files in the draft.
+async fn compute_in(
+    context: &Context,
+    lease: &Lease,
+    listener: &Listener,
+    subject: &SubjectFiles,
+    draft: &Draft,
+) -> Result<(Product, Vec<File>), Error> {
+    let tools = spawn_blocking(media::found_tools).await;
+    let order = Order {
+        job_id: lease.job_id,
+        attempt: lease.attempt,
+        kind: lease.kind.name().to_owned(),
+        input: lease.input.clone(),
+        subject: (subject.files.as_ref())
+            .map_or_else(Default::default, |files| files.path().into()),
+        footage: subject.footage.clone(),
+        threads: context.threads,
+        memory_bytes: context.memory_bytes,
+        tools: tools.map_err(io::Error::other)??,
+    };
+    let command = command(&context.attempt_program, draft.path());
+    let group = spawn_blocking(move || media::ProcessGroup::start_leashed(command)).await;
+    let group = group.map_err(io::Error::other)??;
+    let grace = STOP_GRACE.min(context.lease);
+    match follow(group, &order, listener, grace).await? {
+        End::Done(product, files) => Ok((product, files)),
+        End::Failed(failure) => Err(Error::Attempt(failed(failure, draft))),
+    }
+}
+
+/// Returns the command of a child. It inherits no environment, which may hold secrets.
+fn command((program, arguments): &(PathBuf, Vec<OsString>), folder: &Path) -> Command {
+    let mut command = Command::new(program);
+    command
+        .arg0("flockreel")
+        .args(arguments)
+        .args(logging::arguments())
+        .arg("attempt")
+        .arg(folder)
+        .env_clear()
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command
+}
+
+/// Gives the order, passes on progress, and returns how the attempt ended. Kills the child if it does not end within
+/// `grace` after it was asked to stop.
+async fn follow(
+    mut group: media::ProcessGroup,
+    order: &Order,
+    listener: &Listener,
+    grace: Duration,
+) -> Result<End, Error> {
+    let (Some(stdin), Some(stdout), Some(stderr)) = group.take_pipes() else {
+        return Err(io::Error::other("an attempt has no pipes").into());
+    };
+    let stdin = Sender::from_owned_fd(stdin.into())?;
+    let order = serde_json::to_string(order).map_err(io::Error::other)?;
+    let feeding = tokio::spawn(feed(stdin, order, listener.clone()));
+    let feeding = AbortOnDropHandle::new(feeding);
+    let log = tokio::spawn(relay_log(Receiver::from_owned_fd(stderr.into())?).in_current_span());
+    let mut messages = pin!(read(Receiver::from_owned_fd(stdout.into())?, listener));
+    let end = tokio::select! {
+        end = &mut messages => end,
+        () = listener.stopped() => timeout(grace, &mut messages).await.ok().flatten(),
+    };
+    drop(feeding);
+    let status = spawn_blocking(move || group.end_within(grace)).await;
+    let status = status.map_err(io::Error::other)??;
+    let is_out_of_memory = timeout(grace, log).await;
+    match end {
+        Some(end) => Ok(end),
+        None if listener.is_cancelled() => Err(Error::Cancelled),
+        None => Err(verdict(status, matches!(is_out_of_memory, Ok(Ok(true))))),
+    }
+}
+
+/// Writes the order, then keeps stdin open until the child is to stop.
+async fn feed(mut stdin: Sender, order: String, listener: Listener) {
+    let line = order + "\n";
+    // If the child is gone, its exit tells why.
+    stdin.write_all(line.as_bytes()).await.ok();
+    listener.stopped().await;
+}
+
+/// Passes on progress and returns the end of the attempt, or `None` if the child does not tell it.
+async fn read(stdout: Receiver, listener: &Listener) -> Option<End> {
+    let mut stdout = BufReader::new(stdout);
+    loop {
+        let line = next_line(&mut stdout).await?;
+        let message = serde_json::from_slice(&line).inspect_err(
+            |error| tracing::warn!(%error, "the process of a job sent an unreadable line"),
+        );
+        match message.ok()? {
+            Message::Progress(stage, fraction) => listener.report(&stage, fraction),
+            Message::Decoded(n_frames, took_s) => {
+                let took = Duration::try_from_secs_f64(took_s).unwrap_or_default();
+                listener.count_decoded(n_frames, took);
+            }
+            Message::End(end) => return Some(end),
+        }
+    }
+}
+
+/// Passes the log of the child on. Returns whether the child ran out of memory.
+async fn relay_log(stderr: Receiver) -> bool {
+    let (mut stderr, mut is_out_of_memory) = (BufReader::new(stderr), false);
+    while let Some(line) = next_line(&mut stderr).await {
+        is_out_of_memory |= line.starts_with(OUT_OF_MEMORY);
+        logging::relay(&String::from_utf8_lossy(&line));
+    }
+    is_out_of_memory
+}
+
+/// Returns the next line without its end, at most [`MAX_LINE_BYTES`] of it; `None` at the end.
+async fn next_line(reader: &mut BufReader<Receiver>) -> Option<Vec<u8>> {
+    let mut line = Vec::new();
+    let mut part = reader.take(MAX_LINE_BYTES);
+    let n_bytes = part.read_until(b'\n', &mut line).await.ok()?;
+    line.pop_if(|byte| *byte == b'\n');
+    (n_bytes > 0).then_some(line)
+}
+
+/// Returns why a child ended without a message.
+fn verdict(status: ExitStatus, is_out_of_memory: bool) -> Error {
+    if is_out_of_memory {
+        Error::MemoryLimit
+    } else {
+        Error::Crashed(status)
+    }
+}
+
+/// Returns the failure of a child with the picture that it left.
+fn failed(failure: Failure, draft: &Draft) -> FailedAttempt {
+    FailedAttempt {
+        code: Code::from_name(&failure.code).unwrap_or(Code::Internal),
+        sentence: failure.sentence,
+        is_transient: failure.is_transient,
+        picture: std::fs::read(draft.path().join(refusal::FILE_NAME)).ok(),
+    }
+}
+
+impl From<Film> for SampleFootage {
+    fn from(film: Film) -> SampleFootage {
+        SampleFootage {
+            name: FILM_NAME,
+            width: film.width,
+            height: film.height,
+            fps: film.fps,
+            n_frames: film.n_frames,
+        }
+    }
+}

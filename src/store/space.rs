@@ -1,0 +1,324 @@
+//! Limits of space (docs/explanation/promises.md, "Limited space"): the bytes of each owner, and the bytes that uploads
+//! still bring against the free disk.
+//!
+//! An upload counts with its announced size from its beginning: a resumable one by its row, and the body of a request by
+//! an [`Announced`] in memory. The transaction that stores files checks the limit of their owner again, with the true
+//! size.
+
+use std::collections::HashMap;
+use std::io::ErrorKind;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use sqlx::types::Uuid;
+
+use super::owners::Owner;
+use super::resources::ResourceKind;
+use super::{Error, Store, Transaction, sql};
+
+/// Named lock of transactions that compare the announced bytes of all uploads with the free disk.
+const DISK_LOCK: &str = "disk";
+
+/// The limits of a store. By default there are none.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SpaceLimits {
+    /// Maximum total size of the files and open uploads of one owner, bytes; 0 sets no limit.
+    pub max_owner_bytes: u64,
+    /// Disk space that uploads leave free, bytes.
+    pub disk_reserve_bytes: u64,
+}
+
+/// The limits, and the bodies of requests that are being received. Clones share the bodies.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Space {
+    limits: SpaceLimits,
+    incoming: Arc<Mutex<Incoming>>,
+    refusals: Arc<Refusals>,
+}
+
+/// Announced bytes of the bodies that are being received.
+#[derive(Debug, Default)]
+struct Incoming {
+    /// By owner.
+    announced_bytes: HashMap<Owner, u64>,
+    /// Of all owners, without the bytes that have arrived.
+    missing_bytes: u64,
+}
+
+#[derive(Debug, Default)]
+struct Refusals {
+    by_owner: AtomicU64,
+    by_disk: AtomicU64,
+}
+
+/// The body of a request. It counts as announced until it is dropped.
+pub struct Announced {
+    store: Store,
+    owner: Owner,
+    n_bytes: u64,
+    /// Announced bytes that have not arrived.
+    n_missing: u64,
+}
+
+/// How received files count before their footage does.
+pub enum Counted {
+    /// As the body of a request.
+    Body(Announced),
+    /// As a resumable upload with this id.
+    Upload(Uuid),
+}
+
+/// A number of things and their total size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, sqlx::FromRow)]
+pub struct Amount {
+    /// Number.
+    pub n: i64,
+    /// Total size, bytes.
+    pub n_bytes: i64,
+}
+
+/// Space of an owner.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Usage {
+    /// Stored resources by kind.
+    pub stored: [(ResourceKind, Amount); 4],
+    /// Open resumable uploads, with their announced sizes.
+    pub uploads: Amount,
+    /// Announced size of the bodies of requests that are being received, bytes.
+    pub incoming_bytes: i64,
+    /// Maximum of all these bytes together; `None` = no limit.
+    pub max_bytes: Option<u64>,
+}
+
+impl Usage {
+    /// Returns the bytes that count against the limit.
+    pub fn used_bytes(&self) -> i64 {
+        let stored = self.stored.iter().map(|(_, amount)| amount.n_bytes);
+        stored.sum::<i64>() + self.uploads.n_bytes + self.incoming_bytes
+    }
+}
+
+impl Store {
+    /// Returns the store with these limits. Clones made before have none.
+    pub fn with_space_limits(mut self, limits: SpaceLimits) -> Store {
+        self.space.limits = limits;
+        self
+    }
+
+    /// Announces a body of `n_bytes`. If its size is unknown, `n_bytes` is 0, and the announcement grows with the body.
+    /// Fails with [`Error::OwnerStorageFull`] or `storage_full` if the body does not fit.
+    pub async fn announce(&self, owner: &Owner, n_bytes: u64) -> Result<Announced, Error> {
+        let mut announced = Announced {
+            store: self.clone(),
+            owner: owner.clone(),
+            n_bytes: 0,
+            n_missing: 0,
+        };
+        announced.grow(n_bytes, n_bytes).await?;
+        Ok(announced)
+    }
+
+    /// Fails with [`Error::OwnerStorageFull`] if the owner can store nothing more.
+    pub async fn require_space_left(&self, owner: &Owner) -> Result<(), Error> {
+        if self.space.max_owner_bytes().is_none() {
+            return Ok(());
+        }
+        let used_bytes = owner_bytes(owner, None).fetch_one(&self.reader).await?;
+        self.space.check_owner(used_bytes, 1)
+    }
+
+    /// Fails with `storage_full` if `n_bytes` more would use the reserve of the disk.
+    pub fn check_disk(&self, n_bytes: u64) -> Result<(), Error> {
+        let needed_bytes = n_bytes.saturating_add(self.space.limits.disk_reserve_bytes);
+        if needed_bytes > self.blobs.free_bytes()? {
+            self.space.refusals.by_disk.fetch_add(1, Ordering::Relaxed);
+            return Err(Error::Io(ErrorKind::StorageFull.into()));
+        }
+        Ok(())
+    }
+
+    /// Returns the space of an owner.
+    pub async fn usage(&self, owner: &Owner) -> Result<Usage, Error> {
+        let amount = async |rows: &str| {
+            let sql = format!(
+                "select count(*) as n, cast(coalesce(sum(size_bytes), 0) as bigint) as n_bytes \
+                 from {rows} owner = $1"
+            );
+            let amount = sql::query(sql).bind(owner);
+            amount.fetch_one::<Amount>(&self.reader).await
+        };
+        let mut stored = ResourceKind::ALL.map(|kind| (kind, Amount::default()));
+        for (kind, found) in &mut stored {
+            *found = amount(&format!("{} where", kind.plural())).await?;
+        }
+        Ok(Usage {
+            stored,
+            uploads: amount("uploads where footage_id is null and").await?,
+            incoming_bytes: self.space.announced_bytes(owner).cast_signed(),
+            max_bytes: self.space.max_owner_bytes(),
+        })
+    }
+
+    /// Returns how many uploads and results the limits of owners, and the free disk, have refused in this process.
+    pub fn n_refusals(&self) -> [u64; 2] {
+        let refusals = &self.space.refusals;
+        [&refusals.by_owner, &refusals.by_disk].map(|n| n.load(Ordering::Relaxed))
+    }
+
+    /// Returns the announced size of all bodies that are being received, bytes.
+    pub(super) fn incoming_bytes(&self) -> u64 {
+        self.space.incoming().announced_bytes.values().sum()
+    }
+
+    /// Fails with [`Error::OwnerStorageFull`] if the owner cannot have `n_bytes` more. `instead_of` is an upload that
+    /// does not count, because these bytes replace it. The result holds until the end of the transaction.
+    pub(super) async fn require_owner_space(
+        &self,
+        transaction: &mut Transaction,
+        owner: &Owner,
+        n_bytes: i64,
+        instead_of: Option<Uuid>,
+    ) -> Result<(), Error> {
+        if self.space.max_owner_bytes().is_none() {
+            return Ok(());
+        }
+        transaction.lock(&format!("space of {}", owner.0)).await?;
+        let used_bytes = owner_bytes(owner, instead_of)
+            .fetch_one(transaction)
+            .await?;
+        self.space.check_owner(used_bytes, n_bytes.unsigned_abs())
+    }
+
+    /// Like [`Store::require_owner_space`], for a new resumable upload: bodies of requests count too, and all announced
+    /// bytes must fit on the disk.
+    pub(super) async fn require_upload_space(
+        &self,
+        transaction: &mut Transaction,
+        owner: &Owner,
+        n_bytes: i64,
+    ) -> Result<(), Error> {
+        transaction.lock(DISK_LOCK).await?;
+        let incoming_bytes = self.space.announced_bytes(owner).cast_signed();
+        let all_bytes = n_bytes.saturating_add(incoming_bytes);
+        self.require_owner_space(transaction, owner, all_bytes, None)
+            .await?;
+        let missing_bytes = self.missing_here(missing().fetch_all(transaction).await?);
+        self.check_disk(missing_bytes.saturating_add(n_bytes.unsigned_abs()))
+    }
+
+    /// Returns the bytes that uploads to this machine have announced and not sent yet. `uploads` are all open ones.
+    fn missing_here(&self, uploads: Vec<(Uuid, i64)>) -> u64 {
+        let is_here = |id: Uuid| self.reader.is_file() || self.upload_path(id).exists();
+        let here = uploads.into_iter().filter(|(id, _)| is_here(*id));
+        let of_uploads: u64 = here.map(|(_, n_bytes)| n_bytes.unsigned_abs()).sum();
+        of_uploads + self.space.incoming().missing_bytes
+    }
+}
+
+impl Space {
+    fn incoming(&self) -> MutexGuard<'_, Incoming> {
+        self.incoming.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the announced size of the bodies of an owner, bytes.
+    fn announced_bytes(&self, owner: &Owner) -> u64 {
+        let incoming = self.incoming();
+        incoming.announced_bytes.get(owner).copied().unwrap_or(0)
+    }
+
+    fn max_owner_bytes(&self) -> Option<u64> {
+        Some(self.limits.max_owner_bytes).filter(|max_bytes| *max_bytes > 0)
+    }
+
+    fn check_owner(&self, used_bytes: i64, n_bytes: u64) -> Result<(), Error> {
+        match self.max_owner_bytes() {
+            Some(max_bytes) if used_bytes.unsigned_abs().saturating_add(n_bytes) > max_bytes => {
+                self.refusals.by_owner.fetch_add(1, Ordering::Relaxed);
+                Err(Error::OwnerStorageFull {
+                    used_bytes: used_bytes.unsigned_abs(),
+                    n_bytes,
+                    max_bytes,
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Announced {
+    /// Counts `n_bytes` that have arrived. Fails if there is no space for more.
+    pub async fn receive(&mut self, n_bytes: u64) -> Result<(), Error> {
+        let n_announced = n_bytes.min(self.n_missing);
+        if n_announced == n_bytes {
+            self.store.check_disk(0)?;
+        } else {
+            self.grow(n_bytes - n_announced, 0).await?;
+        }
+        self.n_missing -= n_announced;
+        self.store.space.incoming().missing_bytes -= n_announced;
+        Ok(())
+    }
+
+    /// Announces `n_bytes` more, of which `n_missing` have not arrived.
+    async fn grow(&mut self, n_bytes: u64, n_missing: u64) -> Result<(), Error> {
+        let store = &self.store;
+        let used_bytes = owner_bytes(&self.owner, None).fetch_one(&store.reader);
+        let used_bytes = used_bytes.await?;
+        let missing_bytes = store.missing_here(missing().fetch_all(&store.reader).await?);
+        store.check_disk(missing_bytes.saturating_add(n_missing))?;
+        // Counted and added under one lock, so that simultaneous bodies do not exceed the limit.
+        let mut incoming = store.space.incoming();
+        let announced = incoming.announced_bytes.entry(self.owner.clone());
+        let announced_bytes = announced.or_default();
+        let all_bytes = announced_bytes.saturating_add(n_bytes);
+        store.space.check_owner(used_bytes, all_bytes)?;
+        *announced_bytes = all_bytes;
+        incoming.missing_bytes = incoming.missing_bytes.saturating_add(n_missing);
+        drop(incoming);
+        self.n_bytes += n_bytes;
+        self.n_missing += n_missing;
+        Ok(())
+    }
+}
+
+impl Drop for Announced {
+    fn drop(&mut self) {
+        let mut incoming = self.store.space.incoming();
+        incoming.missing_bytes -= self.n_missing;
+        let announced_bytes = incoming.announced_bytes.entry(self.owner.clone());
+        let announced_bytes = announced_bytes.or_default();
+        *announced_bytes -= self.n_bytes;
+        if *announced_bytes == 0 {
+            incoming.announced_bytes.remove(&self.owner);
+        }
+    }
+}
+
+impl Counted {
+    /// Returns the id of the resumable upload, if it is one.
+    pub fn upload(&self) -> Option<Uuid> {
+        match self {
+            Counted::Body(_) => None,
+            Counted::Upload(id) => Some(*id),
+        }
+    }
+}
+
+/// Returns the query for the bytes of an owner: stored files, and open uploads except `but`.
+fn owner_bytes(owner: &Owner, but: Option<Uuid>) -> sql::ScalarQuery {
+    let stored = ResourceKind::ALL.map(|kind| {
+        let table = kind.plural();
+        format!("select size_bytes from {table} where owner = $1 union all ")
+    });
+    let sql = format!(
+        "select cast(coalesce(sum(size_bytes), 0) as bigint) from ({}\
+         select size_bytes from uploads where owner = $1 and footage_id is null and ($2 is null or id <> $2)) s",
+        stored.concat()
+    );
+    sql::query_scalar(sql).bind(owner).bind(but)
+}
+
+/// Returns the query for the bytes that each open upload has announced and not sent yet.
+fn missing() -> sql::Query {
+    sql::query("select id, size_bytes - offset_bytes from uploads where footage_id is null")
+}

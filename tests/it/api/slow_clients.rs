@@ -1,0 +1,108 @@
+//! A thousand slow clients at once (docs/explanation/promises.md, "Slow clients"). The service is a process of its own, so
+//! that its memory can be measured.
+
+use std::time::{Duration, Instant};
+
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::task::JoinSet;
+use tokio::time::{sleep, timeout};
+
+use crate::common::film::Films;
+use crate::common::process::Server;
+
+const N_CLIENTS: usize = 1000;
+/// Number of open files that the test and the service need, with room for other tests.
+const OPEN_FILES: u64 = 8192;
+/// The promise is 35 s. A busy machine gets more.
+const LONGEST: Duration = Duration::from_secs(70);
+/// Largest growth of the memory of the service, bytes.
+const MAX_GROWTH_BYTES: u64 = 50 << 20;
+
+/// Sends one byte every five seconds after the beginning, and returns once the service closes the connection.
+async fn drip(address: String, beginning: &'static [u8]) {
+    let mut connection = TcpStream::connect(address).await.unwrap();
+    connection.write_all(beginning).await.unwrap();
+    let (mut reader, mut writer) = connection.into_split();
+    let dripping = tokio::spawn(async move {
+        while !beginning.is_empty() && writer.write_all(b"x").await.is_ok() {
+            sleep(Duration::from_secs(5)).await;
+        }
+        std::future::pending::<()>().await;
+    });
+    let mut answer = Vec::new();
+    // A reset is an end too.
+    reader.read_to_end(&mut answer).await.ok();
+    dripping.abort();
+}
+
+/// Lets this process and its children open more files.
+fn permit_open_files() {
+    let limit = getrlimit(Resource::Nofile);
+    let wanted = limit
+        .maximum
+        .map_or(OPEN_FILES, |most| most.min(OPEN_FILES));
+    let more = Rlimit {
+        current: limit.current.map(|now| now.max(wanted)),
+        ..limit
+    };
+    setrlimit(Resource::Nofile, more).unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn thousand_slow_clients_are_closed_and_cost_little() {
+    permit_open_files();
+    let films = Films::new();
+    let server = Server::start(&films.path("data"));
+    assert_eq!(server.get("/healthz").await.status(), 200);
+    let before_bytes = server.resident_bytes();
+    let address = server.base.trim_start_matches("http://").to_owned();
+    let beginnings: [&[u8]; 3] = [
+        b"",
+        b"GET / HTTP/1.1\r\nhost: localhost\r\nx: ",
+        b"POST /v1/footage HTTP/1.1\r\nhost: localhost\r\ncontent-length: 1000\r\n\r\n",
+    ];
+    let start = Instant::now();
+    let mut clients = JoinSet::new();
+    for k in 0..N_CLIENTS {
+        clients.spawn(drip(address.clone(), beginnings[k % beginnings.len()]));
+    }
+    let (mut most_bytes, mut waits) = (0, Vec::new());
+    let all_are_closed = async { while clients.join_next().await.is_some() {} };
+    let watch = async {
+        loop {
+            let asked = Instant::now();
+            assert_eq!(server.get("/healthz").await.status(), 200);
+            waits.push(asked.elapsed());
+            most_bytes = most_bytes.max(server.resident_bytes());
+            sleep(Duration::from_millis(200)).await;
+        }
+    };
+    let closed = tokio::select! {
+        closed = timeout(LONGEST, all_are_closed) => closed,
+        () = watch => unreachable!("it watches for ever"),
+    };
+    assert!(
+        closed.is_ok(),
+        "{} clients are still connected after {LONGEST:?}",
+        clients.len()
+    );
+    waits.sort_unstable();
+    let grown_bytes = most_bytes.saturating_sub(before_bytes);
+    println!(
+        "closed in {:?}, memory +{} KiB, /healthz median {:?}, longest {:?}",
+        start.elapsed(),
+        grown_bytes >> 10,
+        waits[waits.len() / 2],
+        waits[waits.len() - 1]
+    );
+    assert!(
+        grown_bytes < MAX_GROWTH_BYTES,
+        "the memory grew by {grown_bytes} bytes"
+    );
+    assert!(
+        waits[waits.len() / 2] < Duration::from_secs(1),
+        "/healthz: {waits:?}"
+    );
+}
