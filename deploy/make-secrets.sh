@@ -2,8 +2,9 @@
 # Makes the secrets of deploy/compose.yaml: a password of PostgreSQL, a key of the S3-compatible store, and the files
 # that hand them to each container. Keeps them if they exist.
 #
-#   sh deploy/make-secrets.sh [FOLDER]      FOLDER: default deploy/secrets; as root, so that uid 10001 of the image owns
-#                                           the files that it reads
+#   sh deploy/make-secrets.sh [FOLDER]      FOLDER: default deploy/secrets
+#
+# The folder keeps other users of this machine out. In a container, its user must be able to read its files.
 set -eu
 folder=${1:-$(dirname "$0")/secrets}
 
@@ -14,8 +15,8 @@ fi
 
 random() { od -An -N24 -tx1 /dev/urandom | tr -d ' \n'; }
 
-umask 077
-mkdir "$folder.new"
+umask 022
+mkdir -m 700 "$folder.new"
 password=$(random)
 key=$(random)
 printf '%s' "$password" >"$folder.new/postgres-password"
@@ -25,8 +26,5 @@ cat >"$folder.new/seaweedfs.json" <<JSON
 {"identities": [{"name": "flockreel", "actions": ["Admin", "Read", "Write", "List", "Tagging"],
   "credentials": [{"accessKey": "flockreel", "secretKey": "$key"}]}]}
 JSON
-if ! chown 10001 "$folder.new/flockreel.toml" "$folder.new/s3-credentials" 2>/dev/null; then
-    printf 'secrets: not root, so these stay unreadable to uid 10001: flockreel.toml s3-credentials\n' >&2
-fi
 mv "$folder.new" "$folder"
 printf 'secrets: made: %s\n' "$folder"
