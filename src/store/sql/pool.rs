@@ -237,7 +237,11 @@ async fn wait_for_server(options: &PgConnectOptions) -> Result<(), Error> {
                 say(&cause);
                 sleep(SERVER_RETRY.min(left())).await;
             }
-            Some(Ok(connection)) => return Ok(connection.close().await?),
+            Some(Ok(connection)) => {
+                // The server answers, whatever happens to this connection.
+                connection.close().await.ok();
+                return Ok(());
+            }
             Some(Err(_)) => return Ok(()),
             None => {}
         }
