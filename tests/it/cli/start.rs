@@ -4,6 +4,8 @@ use std::io::{BufRead, BufReader};
 use std::net::TcpListener;
 use std::process::{Command, Stdio};
 
+use crate::common::process::Server;
+
 fn flockreel() -> Command {
     Command::new(env!("CARGO_BIN_EXE_flockreel"))
 }
@@ -49,6 +51,24 @@ fn impossible_data_folder_is_named_with_the_reason() {
             assert!(line.ends_with(&format!(": {}", named.display())), "{text}");
         }
     }
+}
+
+#[test]
+fn service_that_requires_tokens_says_how_to_create_the_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let hint = "flockreel token create --name NAME";
+    let log = |flags: &[&str]| Server::start_with(folder.path(), flags).terminate_and_read();
+    assert!(!log(&[]).contains(hint));
+    let first = log(&["--auth", "required"]);
+    assert!(first.contains(hint), "{first}");
+    let create = ["token", "create", "--name", "me", "--data"];
+    let created = flockreel()
+        .args(create)
+        .arg(folder.path())
+        .status()
+        .unwrap();
+    assert!(created.success());
+    assert!(!log(&["--auth", "required"]).contains(hint));
 }
 
 #[test]
