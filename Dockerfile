@@ -22,10 +22,13 @@ RUN /usr/local/sbin/system-packages run health \
 COPY --from=builder /src/target/release/flockreel /usr/local/bin/flockreel
 USER 10001:10001
 VOLUME /data
+# `docker run -p` reaches only a service that listens on all addresses of the container. Such a service asks every
+# client for a token. `docker exec CONTAINER flockreel token create --name NAME` makes the first one
+# (docs/how-to/run-in-containers.md).
+ENV FLOCKREEL_BIND=0.0.0.0:8080 FLOCKREEL_AUTH=required FLOCKREEL_DATA=/data
+EXPOSE 8080
 HEALTHCHECK --interval=30s --timeout=5s --start-period=20s \
     CMD ["curl", "-fsS", "-o", "/dev/null", "http://127.0.0.1:8080/healthz"]
 STOPSIGNAL SIGTERM
 ENTRYPOINT ["flockreel"]
-# The service listens on loopback. Run with `--network host`, or create a token and bind to 0.0.0.0
-# (docs/how-to/run-behind-nginx.md).
-CMD ["serve", "--data", "/data"]
+CMD ["serve"]

@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test stress-test fuzz soak kills arm-test docs deny bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -104,12 +104,14 @@ arm-test: target/vendor ## run the library's tests on an emulated ARM processor,
 docs: target/vendor ## build the documentation, with warnings as errors
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --workspace --no-deps --document-private-items
 
-deny: ## check licences, bans and sources of the dependencies, offline
-	@if $(CARGO) deny --version >/dev/null 2>&1; then \
-		$(CARGO) deny --offline check bans licenses sources; \
-	else \
-		echo "cargo deny: SKIPPED, not installed (cargo install --locked cargo-deny)"; \
-	fi
+deny: ## check licences, bans and sources of the dependencies, offline; installs cargo-deny
+	@CARGO="$(CARGO)" scripts/cargo-deny.sh licences
+
+# Exit status 3: the check cannot be had here, as its script has said.
+supply: deny target/vendor ## also look for known weaknesses, list dependencies in target/sbom.json, run unsafe code under Miri
+	@CARGO="$(CARGO)" scripts/cargo-deny.sh advisories || [ $$? -eq 3 ]
+	@python3 -B scripts/sbom.py target/sbom.json
+	@scripts/miri.sh || [ $$? -eq 3 ]
 
 # Python of the scripts in bench/, with the packages to read films and to write docs/measurements.md.
 BENCH = target/bench-venv/bin/python

@@ -1,6 +1,9 @@
 //! Log lines on stderr, written without ever delaying a response. A bounded queue passes the lines to one
 //! thread, and only that thread waits for stderr. Lines are dropped and counted if the queue is full or
 //! stderr takes no more bytes. A dead or stalled reader of stderr must not stop the service.
+//!
+//! In the JSON format every line is an object, also those that are not events: messages of commands, errors of
+//! the command line, and panics.
 
 use std::backtrace::{Backtrace, BacktraceStatus};
 use std::io::{self, ErrorKind, IsTerminal, Write};
@@ -11,8 +14,11 @@ use std::time::{Duration, Instant};
 use clap::ValueEnum;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
+use tracing::Level;
 use tracing_appender::non_blocking::{NonBlocking, NonBlockingBuilder, WorkerGuard};
 use tracing_subscriber::EnvFilter;
+use tracing_subscriber::fmt::format::Writer;
+use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
 
 /// Maximum number of lines that wait for stderr: a few megabytes, or seconds of a busy service.
 const MAX_QUEUED_LINES: usize = 8192;
@@ -27,13 +33,15 @@ const SHUTDOWN_WAIT: Duration = Duration::from_millis(50);
 static QUEUE: OnceLock<NonBlocking> = OnceLock::new();
 /// Filter and format of the log, once it has started.
 static SETTINGS: OnceLock<(String, LogFormat)> = OnceLock::new();
+/// Whether lines are JSON. Known before the log starts, for errors of the command line.
+static IS_JSON: AtomicBool = AtomicBool::new(false);
 /// Number of lines that stderr did not take.
 static N_UNWRITTEN: AtomicU64 = AtomicU64::new(0);
 /// Whether the process is ending.
 static IS_ENDING: AtomicBool = AtomicBool::new(false);
 
 /// Format of log lines.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum LogFormat {
     /// Plain text for people.
     Text,
@@ -54,7 +62,23 @@ impl Drop for Log {
     }
 }
 
-/// Starts the log of the process. Call it once. `filter` has the syntax of `tracing_subscriber::EnvFilter`.
+/// Selects the format of lines that are written before the log starts.
+pub fn set_format(format: LogFormat) {
+    IS_JSON.store(format == LogFormat::Json, Ordering::Relaxed);
+}
+
+/// Returns whether lines are JSON objects.
+pub fn is_json() -> bool {
+    IS_JSON.load(Ordering::Relaxed)
+}
+
+/// Returns the filter if its syntax is that of `tracing_subscriber::EnvFilter`.
+pub fn check_filter(filter: &str) -> Result<String, String> {
+    let parsed = EnvFilter::try_new(filter);
+    parsed.map_or_else(|error| Err(error.to_string()), |_| Ok(filter.to_owned()))
+}
+
+/// Starts the log of the process. Call it once. `filter` has passed [`check_filter`]; any other logs errors only.
 pub fn start(filter: &str, format: LogFormat) -> Log {
     let (queue, writer) = NonBlockingBuilder::default()
         .lossy(true)
@@ -63,8 +87,9 @@ pub fn start(filter: &str, format: LogFormat) -> Log {
         .finish(Stderr { is_stuck: false });
     let queue = QUEUE.get_or_init(|| queue).clone();
     SETTINGS.get_or_init(|| (filter.to_owned(), format));
+    set_format(format);
     let lines = tracing_subscriber::fmt()
-        .with_env_filter(EnvFilter::new(filter))
+        .with_env_filter(EnvFilter::try_new(filter).unwrap_or_default())
         .with_writer(queue)
         .with_ansi(io::stderr().is_terminal())
         .with_target(false)
@@ -94,9 +119,38 @@ pub fn log_panics() {
     }));
 }
 
-/// Writes one line to stderr, in order with the log lines once the log has started. Errors are ignored,
-/// because there is nowhere left to report them.
-pub fn say(line: &str) {
+/// Writes a message for people to stderr, in order with the log lines once the log has started. In the JSON format
+/// the message becomes an event, whatever the filter. Errors are ignored, because there is nowhere left to report
+/// them.
+pub fn say(message: &str) {
+    say_at(Level::INFO, message);
+}
+
+/// Writes an error message to stderr, as [`say`] does.
+pub fn say_error(message: &str) {
+    say_at(Level::ERROR, message);
+}
+
+fn say_at(level: Level, message: &str) {
+    if is_json() {
+        write_line(&json_line(level, message));
+    } else {
+        write_line(message);
+    }
+}
+
+/// Returns an event in the format of the log. The name of the program, with which messages begin, is left out.
+fn json_line(level: Level, message: &str) -> String {
+    let mut timestamp = String::new();
+    // Writing to a string succeeds.
+    SystemTime
+        .format_time(&mut Writer::new(&mut timestamp))
+        .ok();
+    let message = serde_json::Value::from(message.trim_start_matches("flockreel: "));
+    format!(r#"{{"timestamp":"{timestamp}","level":"{level}","message":{message}}}"#)
+}
+
+fn write_line(line: &str) {
     let line = format!("{line}\n");
     match QUEUE.get() {
         Some(queue) => queue.clone().write_all(line.as_bytes()).ok(),
@@ -117,11 +171,10 @@ pub fn arguments() -> Vec<String> {
 /// Writes a line from the stderr of a child process whose log has the same format. In a log of JSON objects, another
 /// line, such as the last words of the standard library, becomes an event.
 pub fn relay(line: &str) {
-    match SETTINGS.get() {
-        Some((_, LogFormat::Json)) if !line.starts_with('{') => {
-            tracing::warn!("a child process says: {line}");
-        }
-        _ => say(line),
+    if is_json() && !line.starts_with('{') {
+        tracing::warn!("a child process says: {line}");
+    } else {
+        write_line(line);
     }
 }
 

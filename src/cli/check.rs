@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
-use super::{Error, Summary, runtime, say};
+use super::{Error, Summary, runtime, say_error};
 use crate::config::{Database, Storage};
 use crate::jobs::clock::now_ms;
 use crate::store::check::Fault;
@@ -28,7 +28,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let faults = with_store(args.storage, faults)?;
     for fault in &faults {
-        say(&format!("flockreel: {fault}"));
+        say_error(&format!("flockreel: {fault}"));
     }
     match faults.len() {
         0 => Ok(Some(Summary(json!({"faults": []})))),

@@ -6,12 +6,13 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use clap::{ArgAction, Command, CommandFactory, FromArgMatches};
+use clap::{ArgAction, Command, CommandFactory, FromArgMatches, ValueEnum};
 use toml::{Table, Value};
 
 use super::{Cli, Error};
+use crate::logging::{self, LogFormat};
 
 /// Environment variable with the path of the file.
 const VARIABLE: &str = "FLOCKREEL_CONFIG";
@@ -22,28 +23,48 @@ const CONFIG: &str = "config";
 pub type Settings = BTreeMap<String, String>;
 
 /// Parses the arguments, with defaults from the settings file if there is one. Fails if the file is invalid.
-/// If the arguments are invalid or ask for help, clap prints a message and ends the process.
+/// If the arguments are invalid or ask for help, clap prints a message and ends the process. If log lines are
+/// JSON, invalid arguments are an error instead.
 pub fn parse(arguments: &[OsString]) -> Result<Cli, Error> {
-    let file = path_in(arguments).or_else(|| std::env::var_os(VARIABLE).map(PathBuf::from));
-    let command = match file {
-        Some(file) => with_defaults(Cli::command(), &read(&file)?),
+    let file = last_value(arguments, "--config").or_else(|| std::env::var_os(VARIABLE));
+    let settings = file.map(|file| read(Path::new(&file))).transpose();
+    logging::set_format(log_format(
+        arguments,
+        settings.as_ref().ok().and_then(Option::as_ref),
+    ));
+    let command = match settings? {
+        Some(settings) => with_defaults(Cli::command(), &settings),
         None => Cli::command(),
     };
-    let matches = command.get_matches_from(arguments);
-    Ok(Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit()))
+    let parsed = command.try_get_matches_from(arguments);
+    let parsed = parsed.and_then(|matches| Cli::from_arg_matches(&matches));
+    parsed.map_err(|error| {
+        if !error.use_stderr() || !logging::is_json() {
+            error.exit();
+        }
+        Error::Usage(first_line(&error))
+    })
 }
 
-/// Returns the file of the last `--config FILE` or `--config=FILE`.
-fn path_in(arguments: &[OsString]) -> Option<PathBuf> {
-    let flags = arguments
-        .iter()
-        .enumerate()
-        .take_while(|(_, flag)| *flag != "--");
-    let paths = flags.filter_map(|(idx, flag)| match flag.to_str()? {
-        "--config" => arguments.get(idx + 1).map(PathBuf::from),
-        flag => flag.strip_prefix("--config=").map(PathBuf::from),
+/// Returns the format of log lines that arguments, environment and settings ask for, before they are checked.
+fn log_format(arguments: &[OsString], settings: Option<&Settings>) -> LogFormat {
+    let of_file = || settings?.get("log_format").map(OsString::from);
+    let name = last_value(arguments, "--log-format")
+        .or_else(|| std::env::var_os("FLOCKREEL_LOG_FORMAT"))
+        .or_else(of_file);
+    let name = name.unwrap_or_default();
+    LogFormat::from_str(&name.to_string_lossy(), false).unwrap_or(LogFormat::Text)
+}
+
+/// Returns the value of the last `FLAG VALUE` or `FLAG=VALUE`.
+fn last_value(arguments: &[OsString], flag: &str) -> Option<OsString> {
+    let words = arguments.iter().enumerate();
+    let words = words.take_while(|(_, word)| *word != "--");
+    let values = words.filter_map(|(idx, word)| match word.to_str()?.strip_prefix(flag)? {
+        "" => arguments.get(idx + 1).cloned(),
+        rest => rest.strip_prefix('=').map(OsString::from),
     });
-    paths.last()
+    values.last()
 }
 
 /// Reads the file. Fails if it is no TOML, or has an unknown setting or an invalid value.
@@ -114,12 +135,14 @@ fn check(flag: &str, text: &str, is_switch: bool) -> Result<(), String> {
     };
     let arguments = ["flockreel", "serve"].into_iter().map(str::to_owned);
     let result = Cli::command().try_get_matches_from(arguments.chain(given));
-    let Err(error) = result else {
-        return Ok(());
-    };
+    result.map_or_else(|error| Err(first_line(&error)), |_| Ok(()))
+}
+
+/// Returns the message of clap without its usage and tips.
+fn first_line(error: &clap::Error) -> String {
     let sentence = error.to_string();
     let line = sentence.lines().next().unwrap_or_default();
-    Err(line.trim_start_matches("error: ").to_owned())
+    line.trim_start_matches("error: ").to_owned()
 }
 
 /// Returns the command and its subcommands with the settings as defaults of their options.
@@ -143,7 +166,7 @@ mod tests {
     fn config_file_is_found_among_the_arguments() {
         let of = |line: &str| {
             let arguments: Vec<OsString> = line.split(' ').map(OsString::from).collect();
-            path_in(&arguments)
+            last_value(&arguments, "--config")
         };
         assert_eq!(of("flockreel serve --config a.toml"), Some("a.toml".into()));
         assert_eq!(

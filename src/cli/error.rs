@@ -97,11 +97,18 @@ impl From<fish::Error> for Error {
     }
 }
 
-/// A store that is in use, or belongs to another database, is a usage error.
+/// A store that is in use, cannot be opened, or belongs to another database, is a usage error.
 impl From<store::Error> for Error {
     fn from(error: store::Error) -> Error {
         match error {
             store::Error::InUse(_) | store::Error::ForeignFiles => Error::Usage(error.to_string()),
+            store::Error::Unusable { .. } if error.code() == Code::Internal => {
+                Error::Usage(error.to_string())
+            }
+            store::Error::Unreachable { place, cause } => Error::Io {
+                what: format!("the database at {place} cannot be reached"),
+                cause: std::io::Error::other(cause),
+            },
             _ => Error::work(error.code(), &error),
         }
     }

@@ -38,7 +38,7 @@ pub use error::Error;
 pub use progress::Listener;
 
 use crate::config;
-use crate::logging::{self, LogFormat, say};
+use crate::logging::{self, LogFormat, say, say_error};
 use crate::media::{self, Tool};
 use crate::store::Spill;
 use flockreel_core::formats::library_dir::{self, StoredLibrary};
@@ -53,7 +53,8 @@ pub struct Cli {
     json: bool,
     /// Filter of the log on stderr, such as `debug` or `flockreel::jobs=debug`. Default: `info` for `serve`
     /// and `worker`, else `warn`.
-    #[arg(long, global = true, env = "FLOCKREEL_LOG", value_name = "FILTER")]
+    #[arg(long, global = true, env = "FLOCKREEL_LOG", value_name = "FILTER",
+        value_parser = logging::check_filter)]
     log: Option<String>,
     #[command(flatten)]
     media: config::MediaTools,
@@ -121,7 +122,7 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
     let cli = match config_file::parse(arguments) {
         Ok(cli) => cli,
         Err(error) => {
-            say(&format!("flockreel: {error}"));
+            say_error(&format!("flockreel: {error}"));
             return ExitCode::from(error.exit_code());
         }
     };
@@ -129,14 +130,14 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
     // Services log all their events, other commands only warnings.
     let default = if serves { "info" } else { "warn" };
     let _log = logging::start(cli.log.as_deref().unwrap_or(default), cli.log_format);
-    if serves || matches!(cli.command, Command::Attempt(_)) {
+    if serves || logging::is_json() || matches!(cli.command, Command::Attempt(_)) {
         logging::log_panics();
     }
     media::configure(&cli.media);
     match run(cli.command, cli.json) {
         Ok(summary) => print(cli.json, &summary),
         Err(error) => {
-            say(&format!("flockreel: {error}"));
+            say_error(&format!("flockreel: {error}"));
             if let Some(advice) = error.advice() {
                 say(&format!("flockreel: {advice}"));
             }

@@ -1,11 +1,12 @@
 //! Progress of a command on stderr: a bar on a terminal, plain lines otherwise. All commands share this
 //! module.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::sync::Mutex;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::logging::{self, say};
 use flockreel_core::progress::Progress;
 
 /// Number of steps of a stage. A plain line is written at its start and after each step. Free choice.
@@ -22,9 +23,10 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Returns a listener that shows a bar if stderr is a terminal, else plain lines.
+    /// Returns a listener that shows a bar if stderr is a terminal for people, else plain lines.
     pub fn new() -> Listener {
-        let bar = std::io::stderr().is_terminal().then(|| {
+        let has_bar = std::io::stderr().is_terminal() && !logging::is_json();
+        let bar = has_bar.then(|| {
             let bar = ProgressBar::new(TICKS);
             let template = "{msg:>12} [{bar:32}] {percent:>3}% {elapsed}";
             if let Ok(style) = ProgressStyle::with_template(template) {
@@ -64,8 +66,7 @@ impl Progress for Listener {
             }
             None if is_new_step => {
                 let percent = (fraction * 100.0).round();
-                // A closed stderr must not stop the work.
-                writeln!(std::io::stderr(), "{stage}: {percent}%").ok();
+                say(&format!("{stage}: {percent}%"));
             }
             None => {}
         }

@@ -38,6 +38,7 @@ async fn serve(config: Config) -> Result<(), Error> {
     let with_sample = !config.no_sample;
     require_token_beyond_loopback(&config).await?;
     let state = AppState::open(config).await?;
+    explain_first_token(&state).await?;
     let (listener, address) = listen(bind).await?;
     let metrics = match state.config.monitoring.metrics_bind {
         Some(bind) => Some(listen(bind).await?),
@@ -102,6 +103,16 @@ async fn require_token_beyond_loopback(config: &Config) -> Result<(), Error> {
          instead of: {}",
         config.bind
     )))
+}
+
+/// Says how to create a token if the service requires one and nobody has one yet.
+async fn explain_first_token(state: &AppState) -> Result<(), Error> {
+    if state.config.requires_tokens() && !state.context.store.has_tokens(now_ms()).await? {
+        say(
+            "flockreel: no token exists, so every request is refused: run `flockreel token create --name NAME`",
+        );
+    }
+    Ok(())
 }
 
 /// Waits for SIGTERM or SIGINT.

@@ -79,7 +79,8 @@ impl Worker {
             "job",
             job.id = %lease.job_id,
             job.kind = lease.kind.name(),
-            attempt = lease.attempt
+            attempt = lease.attempt,
+            trace_id = lease.trace_id()
         );
         self.attempt(lease).instrument(span).await
     }

@@ -12,6 +12,9 @@ pub enum Damage {
     /// The index that locates the pictures is missing.
     #[error("the index is missing")]
     NoIndex,
+    /// The index that locates the pictures is incomplete or points beyond the end of the file.
+    #[error("the index is damaged")]
+    BrokenIndex,
     /// The file ends before its own structure does.
     #[error("the pictures end after {span_s:.1} s, at picture {n_pictures}")]
     EndsAt {

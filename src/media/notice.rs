@@ -12,6 +12,15 @@ pub enum Notice {
         /// Number of pictures found.
         n_pictures: usize,
     },
+    /// The index of another track than that of the pictures is damaged.
+    #[error(
+        "The index of the sound or of another track is damaged, but all {n_pictures} pictures are readable: copy the \
+         file again if the film should have sound."
+    )]
+    IndexDamaged {
+        /// Number of pictures found.
+        n_pictures: usize,
+    },
     /// The recorder's clock was set, or the recording paused.
     #[error(
         "The timestamps of the file jump {n_leaps} times, first by {by_s:.1} s at {at_s:.1} s. The pictures are \
@@ -53,6 +62,7 @@ impl Notice {
     pub fn code(&self) -> &'static str {
         match self {
             Notice::CutAfterPictures { .. } => "cut_after_pictures",
+            Notice::IndexDamaged { .. } => "index_damaged",
             Notice::TimesLeap { .. } => "times_leap",
             Notice::RateAssumed { .. } => "rate_assumed",
             Notice::GrayStretched { .. } => "gray_stretched",

@@ -1,7 +1,7 @@
 //! Errors of the store. A full disk has its own stable code (docs/explanation/promises.md, "Full disk").
 
-use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::io::{self, ErrorKind};
+use std::path::{Path, PathBuf};
 
 use sqlx::error::DatabaseError;
 use sqlx::sqlite::SqliteError;
@@ -25,6 +25,22 @@ pub enum Error {
     /// A file could not be read or written.
     #[error("a file of the store could not be read or written: {0}")]
     Io(#[from] std::io::Error),
+    /// A folder or file that a setting names cannot be opened or created.
+    #[error("cannot be used: {cause}: {}", path.display())]
+    Unusable {
+        /// The folder or file.
+        path: PathBuf,
+        /// The reason.
+        cause: io::Error,
+    },
+    /// The database server does not answer, or does not accept connections.
+    #[error("the database at {place} cannot be reached: {cause}")]
+    Unreachable {
+        /// Host and port, or the path of the socket.
+        place: String,
+        /// The last reason.
+        cause: String,
+    },
     /// The bucket returned an error or was not reached.
     #[error("the bucket returned an error or was not reached: {0}")]
     Bucket(#[from] object_store::Error),
@@ -100,6 +116,14 @@ pub enum Error {
 }
 
 impl Error {
+    /// Returns a function for `map_err` that names the folder or file of an I/O error.
+    pub(super) fn at(path: &Path) -> impl Fn(io::Error) -> Error {
+        move |cause| Error::Unusable {
+            path: path.to_owned(),
+            cause,
+        }
+    }
+
     /// Returns the stable code.
     pub fn code(&self) -> Code {
         match self {
@@ -109,7 +133,9 @@ impl Error {
             Error::QuotaExceeded { .. } => Code::QuotaExceeded,
             Error::QueueFull { .. } => Code::QueueFull,
             Error::OwnerStorageFull { .. } | Error::TooManyUploads { .. } => Code::OwnerStorageFull,
-            Error::Io(error) if is_disk_full(error) => Code::StorageFull,
+            Error::Io(error) | Error::Unusable { cause: error, .. } if is_disk_full(error) => {
+                Code::StorageFull
+            }
             Error::Sql(sqlx::Error::Io(error)) if is_disk_full(error) => Code::StorageFull,
             Error::Sql(sqlx::Error::Database(error)) if is_database_full(error.as_ref()) => {
                 Code::StorageFull
@@ -117,6 +143,8 @@ impl Error {
             Error::Sql(_)
             | Error::Migrate(_)
             | Error::Io(_)
+            | Error::Unusable { .. }
+            | Error::Unreachable { .. }
             | Error::Bucket(_)
             | Error::CorruptFile(_)
             | Error::InUse(_)

@@ -61,7 +61,7 @@ impl Store {
     /// [`Error::ForeignFiles`] if the files belong to another database.
     pub async fn open(storage: impl Into<Storage>) -> Result<Store, Error> {
         let storage = storage.into();
-        std::fs::create_dir_all(&storage.data)?;
+        std::fs::create_dir_all(&storage.data).map_err(Error::at(&storage.data))?;
         let mut locks = vec![lock(&storage.data.join("lock"))?];
         // Two processes may use the same database file with different data folders.
         if let Database::Sqlite(file) = storage.database() {
@@ -178,14 +178,14 @@ async fn answers<T>(probe: impl Future<Output = Result<T, sqlx::Error>>) -> bool
 }
 
 fn lock(path: &Path) -> Result<File, Error> {
-    let file = File::create(path)?;
+    let file = File::create(path).map_err(Error::at(path))?;
     match try_lock_briefly(&file) {
         Ok(()) => Ok(file),
         Err(TryLockError::WouldBlock) => {
             let folder = path.parent().unwrap_or(path);
             Err(Error::InUse(folder.to_owned()))
         }
-        Err(TryLockError::Error(error)) => Err(error.into()),
+        Err(TryLockError::Error(error)) => Err(Error::at(path)(error)),
     }
 }
 

@@ -18,6 +18,9 @@ use prometheus_client::registry::Registry;
 use tracing::Instrument;
 use uuid::Uuid;
 
+use crate::store::jobs::trace::{self, TraceParent};
+
+const TRACE_PARENT: HeaderName = HeaderName::from_static("traceparent");
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 /// Longest request id that is accepted from a client, bytes. Free choice.
 const MAX_ID_BYTES: usize = 64;
@@ -121,10 +124,13 @@ pub(in crate::api) async fn observe(
     let matched = request.extensions().get::<MatchedPath>().cloned();
     let route = matched.as_ref().map_or("unmatched", MatchedPath::as_str);
     let path = request.uri().path();
-    let span = tracing::info_span!("request", request_id = id, %method, path);
+    let trace = trace_of(request.headers());
+    let trace_id = trace.as_ref().map(TraceParent::trace_id);
+    let span = tracing::info_span!("request", request_id = id, trace_id, %method, path);
     requests.under_way.inc();
     let under_way = UnderWay(requests.under_way.clone());
-    let mut answer = next.run(request).instrument(span.clone()).await;
+    let answered = trace::within(trace, next.run(request));
+    let mut answer = answered.instrument(span.clone()).await;
     drop(under_way);
     let took = start.elapsed();
     requests.count(route, &method, &answer, took);
@@ -161,6 +167,13 @@ fn id_of(headers: &HeaderMap) -> String {
     };
     let given = given.filter(is_plain).map(str::to_owned);
     given.unwrap_or_else(|| Uuid::now_v7().to_string())
+}
+
+/// Returns the trace of a request that names exactly one.
+fn trace_of(headers: &HeaderMap) -> Option<TraceParent> {
+    let mut given = headers.get_all(TRACE_PARENT).iter();
+    let only = given.next().filter(|_| given.next().is_none());
+    TraceParent::parse(only?.to_str().ok()?)
 }
 
 #[cfg(test)]

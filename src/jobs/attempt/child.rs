@@ -43,7 +43,8 @@ pub fn run(folder: &Path) -> io::Result<()> {
         "job",
         job.id = %order.job_id,
         job.kind = order.kind,
-        attempt = order.attempt
+        attempt = order.attempt,
+        trace_id = order.trace_id
     );
     let attempt = Attempt {
         reporter: &reporter,

@@ -18,6 +18,8 @@ pub(super) struct Order {
     pub(super) job_id: JobId,
     /// Number of the attempt, for the log.
     pub(super) attempt: i64,
+    /// Trace of the request that queued the job, for the log.
+    pub(super) trace_id: Option<String>,
     /// Kind of the job.
     pub(super) kind: String,
     /// Input of the job, JSON.

@@ -138,6 +138,7 @@ async fn compute_in(
     let order = Order {
         job_id: lease.job_id,
         attempt: lease.attempt,
+        trace_id: lease.trace_id(),
         kind: lease.kind.name().to_owned(),
         input: lease.input.clone(),
         subject: (subject.files.as_ref())

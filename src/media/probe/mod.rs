@@ -6,6 +6,7 @@
 
 mod ending; // detection of files that are cut off
 pub(in crate::media) mod header; // stream headers
+mod mov_index; // check of the index of an MP4 file
 mod packets; // timestamps of packets and pictures
 pub(in crate::media) mod timeline; // presentation times -> a constant rate
 mod timestamps; // correction of a recorder's timestamps
@@ -29,6 +30,7 @@ use header::{
     Orientation, alpha_decoder, check_codec, color_of, has_alpha, index_of, is_interlaced, number,
     orientation_of, parse_header, ratio, read_header, shown_size, text, video_streams,
 };
+use mov_index::MovIndex;
 use packets::{AllPackets, Packets, Pictures};
 use timeline::{Claims, Timeline};
 
@@ -84,6 +86,8 @@ struct FileInfo {
     container: Container,
     n_bytes: u64,
     ending: Ending,
+    /// Whether the index of each track is damaged; only known for MP4 and QuickTime.
+    index: MovIndex,
 }
 
 /// Reads the headers and packet timestamps of a file, and refuses a file that exceeds the limits.
@@ -93,25 +97,15 @@ pub(in crate::media) fn probe(
     options: &ReadOptions,
 ) -> Result<Probe, Error> {
     let file = inspect(path, limits)?;
-    let FileInfo {
-        container,
-        n_bytes,
-        ending,
-    } = file;
+    let (container, n_bytes) = (file.container, file.n_bytes);
     let read_packets = || AllPackets::read(container, path, n_bytes, limits);
     let (header, packets) = thread::scope(|scope| {
         let thread = (n_bytes < MAX_PARALLEL_BYTES).then(|| scope.spawn(read_packets));
         let header = read_header(container, path, limits);
         (header, thread.and_then(|thread| thread.join().ok()))
     });
-    let header = header.map_err(|error| match (error, ending) {
-        (
-            Error::NotAVideo(_),
-            Ending::AfterPictures | Ending::InsideSamples | Ending::InsideData,
-        ) => Error::Truncated(Damage::NoIndex),
-        (error, _) => error,
-    })?;
-    let streams = video_streams(&header, limits)?;
+    let header = header.map_err(|error| file.explain(error))?;
+    let streams = video_streams(&header, limits).map_err(|error| file.explain(error))?;
     if let [only] = streams[..] {
         check_stream(only, limits, options)?;
     }
@@ -153,8 +147,8 @@ fn judge(
     let times = PictureTimes::find(file, stream, packets, decode, limits)?;
     let (timeline, mut notices) = times.timeline(stream, limits, options)?;
     let n_pictures = times.times_s.len();
-    if file.ending != Ending::Whole && !limits.allow_truncated {
-        notices.push(Notice::CutAfterPictures { n_pictures });
+    if !limits.allow_truncated {
+        notices.extend(file.notice(n_pictures));
     }
     Ok(Probe {
         container: file.container,
@@ -192,11 +186,42 @@ fn inspect(path: &Path, limits: &Limits) -> Result<FileInfo, Error> {
         .map_err(&failed)?;
     let container = Container::detect(&head)?;
     let ending = Ending::detect(container, &file, n_bytes).map_err(&failed)?;
+    let index = match container {
+        Container::Mov => MovIndex::read(&file, n_bytes).map_err(&failed)?,
+        _ => MovIndex::default(),
+    };
     Ok(FileInfo {
         container,
         n_bytes,
         ending,
+        index,
     })
+}
+
+impl FileInfo {
+    /// Returns the reason why ffprobe found no video, which is the damage of the file if there is any.
+    fn explain(&self, error: Error) -> Error {
+        match error {
+            Error::NotAVideo(_) if self.ending != Ending::Whole => {
+                Error::Truncated(Damage::NoIndex)
+            }
+            Error::NotAVideo(_) | Error::NoVideoStream if self.index.is_damaged() => {
+                Error::Truncated(Damage::BrokenIndex)
+            }
+            error => error,
+        }
+    }
+
+    /// Returns a notice if the file is damaged. The pictures of the film are known to be whole.
+    fn notice(&self, n_pictures: usize) -> Option<Notice> {
+        if self.ending != Ending::Whole {
+            Some(Notice::CutAfterPictures { n_pictures })
+        } else if self.index.is_damaged() {
+            Some(Notice::IndexDamaged { n_pictures })
+        } else {
+            None
+        }
+    }
 }
 
 /// The pictures of a film with their times in the file.
@@ -208,7 +233,7 @@ struct PictureTimes {
 
 impl PictureTimes {
     /// Finds the pictures from their packets or, if the packets do not determine them, by decoding. Refuses a
-    /// film that is cut off or damaged, unless the limits allow it.
+    /// film whose pictures are cut off or damaged, unless the limits allow it.
     fn find(
         file: &FileInfo,
         stream: &Value,
@@ -244,6 +269,8 @@ impl PictureTimes {
                 n_pictures: times.times_s.len(),
                 span_s: times.span_s(),
             }))
+        } else if file.index.is_damaged_for(packets.stream_idx) && !limits.allow_truncated {
+            Err(Error::Truncated(Damage::BrokenIndex))
         } else {
             Ok(times)
         }

@@ -1,4 +1,5 @@
-//! Files in an S3-compatible bucket. Address and keys are in the usual `AWS_*` variables. Uploads in parts
+//! Files in an S3-compatible bucket. Address and keys are in the usual `AWS_*` variables; the keys may be in the file
+//! of `AWS_SHARED_CREDENTIALS_FILE`, as secrets of containers are. Uploads in parts
 //! use parts of equal size and are aborted on failure. A part left by a crash costs money until a rule of the
 //! bucket removes it.
 
@@ -38,11 +39,53 @@ pub(super) struct Bucket {
     prefix: String,
 }
 
+/// The key with which requests are signed.
+#[derive(PartialEq, Eq)]
+struct Keys {
+    id: String,
+    secret: String,
+}
+
+impl Keys {
+    /// Reads the profile `default` of a credentials file, as other programs for S3 write it.
+    fn read(file: &FilePath) -> Result<Keys, Error> {
+        let text = std::fs::read_to_string(file).map_err(Error::at(file))?;
+        let absent = "the section [default] lacks aws_access_key_id or aws_secret_access_key";
+        Keys::parse(&text).ok_or_else(|| Error::at(file)(io::Error::other(absent)))
+    }
+
+    fn parse(text: &str) -> Option<Keys> {
+        let lines = text.lines().map(str::trim);
+        let profile = lines.skip_while(|line| *line != "[default]").skip(1);
+        let settings = profile
+            .take_while(|line| !line.starts_with('['))
+            .filter_map(|line| line.split_once('='));
+        let settings: BTreeMap<&str, &str> = settings
+            .map(|(name, value)| (name.trim(), value.trim()))
+            .collect();
+        let value = |name| settings.get(name).copied().map(str::to_owned);
+        Some(Keys {
+            id: value("aws_access_key_id")?,
+            secret: value("aws_secret_access_key")?,
+        })
+    }
+}
+
 impl Bucket {
     /// Opens the bucket. Fails if it cannot be listed.
     pub(super) async fn open(name: &str, prefix: &str) -> Result<Bucket, Error> {
         tls::choose_cryptography();
-        let builder = AmazonS3Builder::from_env().with_bucket_name(name);
+        let mut builder = AmazonS3Builder::from_env().with_bucket_name(name);
+        let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty());
+        // Keys in the environment come first, as in other programs.
+        if variable("AWS_ACCESS_KEY_ID").is_none()
+            && let Some(file) = variable("AWS_SHARED_CREDENTIALS_FILE")
+        {
+            let Keys { id, secret } = Keys::read(FilePath::new(&file))?;
+            builder = builder
+                .with_access_key_id(id)
+                .with_secret_access_key(secret);
+        }
         // HTTP is used only if the configured address asks for it.
         let options = ClientOptions::new().with_allow_http(true);
         let store = builder.with_client_options(options).build()?;
@@ -177,4 +220,28 @@ async fn copy(file: &FilePath, writer: &mut BufWriter) -> io::Result<()> {
         return Err(error);
     }
     writer.shutdown().await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_are_read_from_the_default_profile() {
+        let keys = Keys::parse(
+            "[other]\naws_access_key_id = no\n\n[default]\n# comment\n aws_access_key_id=me \n\
+             aws_secret_access_key = a=b/c\n[last]\naws_access_key_id = no\n",
+        );
+        let (id, secret) = ("me".to_owned(), "a=b/c".to_owned());
+        assert!(keys == Some(Keys { id, secret }));
+        for lacking in [
+            "",
+            "aws_access_key_id = a\naws_secret_access_key = b",
+            "[default]\naws_access_key_id = a\n[x]\naws_secret_access_key = b",
+        ] {
+            assert!(Keys::parse(lacking).is_none(), "{lacking}");
+        }
+        let error = Keys::read(FilePath::new("/dev/null/keys")).err();
+        assert!(error.is_some_and(|error| error.to_string().ends_with(": /dev/null/keys")));
+    }
 }

@@ -85,8 +85,11 @@ pub struct Fetched {
 impl Blobs {
     pub(super) async fn open(storage: &Storage) -> Result<Blobs, Error> {
         let uploads = storage.data.join("uploads");
-        fs::create_dir_all(&uploads)?;
-        let open_local = |folder: &Path| LocalFolder::open(folder).map(Backend::Local);
+        fs::create_dir_all(&uploads).map_err(Error::at(&uploads))?;
+        let open_local = |folder: &Path| match LocalFolder::open(folder) {
+            Ok(local) => Ok(Backend::Local(local)),
+            Err(cause) => Err(Error::at(folder)(cause)),
+        };
         let data = &storage.data;
         let (backend, drafts) = match &storage.store {
             None => (open_local(&data.join("blobs"))?, data.join("tmp")),
@@ -97,8 +100,8 @@ impl Blobs {
                 (Backend::Bucket(bucket), data.join("tmp"))
             }
         };
-        let drafts = Arc::new(Drafts::open(&drafts)?);
-        local::sync_folder(data)?;
+        let drafts = Arc::new(Drafts::open(&drafts).map_err(Error::at(&drafts))?);
+        local::sync_folder(data).map_err(Error::at(data))?;
         Ok(Blobs {
             backend,
             drafts,

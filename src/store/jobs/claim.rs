@@ -54,7 +54,8 @@ impl Store {
                  and (j.after_job is null \
                       or exists (select 1 from jobs a where a.id = j.after_job and a.state = 'done')) \
                  order by t.n_running, j.priority desc, coalesce(t.last_ms, 0), j.small desc, j.id limit 1 for update of j skip locked) \
-             returning id as job_id, kind, input, result_id, attempt, fence, own_crashes, transient_ends",
+             returning id as job_id, kind, input, result_id, attempt, fence, own_crashes, transient_ends, \
+             traceparent",
         )
         .bind(process)
         .bind(now_ms)

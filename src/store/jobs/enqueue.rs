@@ -4,6 +4,7 @@
 use sqlx::types::Uuid;
 
 use super::follow::{cancel_followers, fail_followers};
+use super::trace::{self, TraceParent};
 use super::{JobState, Kind};
 use crate::store::owners::{Account, Owner};
 use crate::store::{Error, Store, Transaction, sql};
@@ -55,7 +56,7 @@ impl Store {
         }
         let added = sql::query(
             "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, \
-             created_ms, owner, small) select $1, $2, 'queued', $3, $4, $5, $6, $7, $7, $8, $11 \
+             created_ms, owner, small, traceparent) select $1, $2, 'queued', $3, $4, $5, $6, $7, $7, $8, $11, $12 \
              where ($9 is null or $9 > (select count(*) from jobs \
              where owner = $8 and state in ('queued', 'running'))) \
              and $10 > (select count(*) from jobs where state in ('queued', 'running'))",
@@ -71,6 +72,7 @@ impl Store {
         .bind(job.account.quota)
         .bind(job.max_queued)
         .bind(job.is_small)
+        .bind(trace::current().as_ref().map(TraceParent::as_str))
         .execute(&mut transaction)
         .await?;
         if added == 0 {

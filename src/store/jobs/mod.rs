@@ -25,6 +25,8 @@ pub mod release;
 pub mod requeue;
 pub mod rescue;
 pub mod retry;
+pub mod trace;
+
 #[cfg(test)]
 mod tests;
 
@@ -33,6 +35,7 @@ use sqlx::types::Uuid;
 use super::Error;
 use super::resources::ResourceKind;
 use flockreel_core::ids::JobId;
+use trace::TraceParent;
 
 /// Kinds of jobs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,6 +86,16 @@ pub struct Lease {
     pub own_crashes: i64,
     /// Number of attempts that ended for a transient reason.
     pub transient_ends: i64,
+    /// Header `traceparent` of the request that queued the job.
+    pub traceparent: Option<String>,
+}
+
+impl Lease {
+    /// Returns the id of the trace to which the job belongs, for the log.
+    pub fn trace_id(&self) -> Option<String> {
+        let trace = TraceParent::parse(self.traceparent.as_deref()?)?;
+        Some(trace.trace_id().to_owned())
+    }
 }
 
 /// Whether a transition that requires a valid lease took place.

@@ -4,9 +4,11 @@
 //! snapshot to write, so `database is locked` does not occur. PostgreSQL locks rows. Rules that involve more
 //! than the changed rows use a named lock ([`Transaction::lock`]).
 
+use std::io;
 use std::path::Path;
+use std::pin::pin;
 use std::str::FromStr;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use sqlx::migrate::{MigrateDatabase, Migrator};
 use sqlx::postgres::{PgConnectOptions, PgConnection, PgListener, PgPoolOptions};
@@ -15,8 +17,11 @@ use sqlx::sqlite::{
 };
 use sqlx::{Connection, Executor, PgPool, Postgres, Sqlite, SqlitePool};
 
+use tokio::time::{sleep, timeout};
+
 use super::{query, query_scalar};
 use crate::store::Error;
+use flockreel_core::code::Code;
 
 static SQLITE_MIGRATIONS: Migrator = sqlx::migrate!("migrations/sqlite");
 static POSTGRES_MIGRATIONS: Migrator = sqlx::migrate!("migrations/postgres");
@@ -25,6 +30,13 @@ const SQLITE_READERS: u32 = 4;
 /// Number of connections of one process. Many processes share the server's limit, which is usually 100.
 const POSTGRES_CONNECTIONS: u32 = 8;
 
+/// Longest wait at the start for a server that does not answer. Free choice; a server that recovers from a crash
+/// needs about as long.
+const MAX_SERVER_WAIT: Duration = Duration::from_secs(30);
+/// Interval between attempts to connect, and between log lines about the wait. Free choice.
+const SERVER_RETRY: Duration = Duration::from_secs(2);
+/// Error codes of PostgreSQL while it starts or stops, or has too many connections.
+const BUSY_SERVER: [&str; 4] = ["57P01", "57P02", "57P03", "53300"];
 /// Error code of PostgreSQL: the database does not exist.
 const NO_SUCH_DATABASE: &str = "3D000";
 /// Error code of PostgreSQL: the database exists already.
@@ -70,7 +82,8 @@ impl Pool {
             .max_connections(1)
             .after_release(|connection, _| Box::pin(async { Ok(is_idle(connection).await) }))
             .connect_with(options.clone())
-            .await?;
+            .await
+            .map_err(|error| unusable(file, error.into()))?;
         if migrates {
             SQLITE_MIGRATIONS.run(&writer).await?;
         }
@@ -81,10 +94,11 @@ impl Pool {
         Ok([Pool::Sqlite(writer), Pool::Sqlite(readers)])
     }
 
-    /// Connects to a server, creates the database if absent, and migrates it to this version's schema.
-    /// Processes that start at the same time wait for each other.
+    /// Connects to a server, creates the database if absent, and migrates it to this version's schema. Waits for
+    /// a server that is starting. Processes that start at the same time wait for each other.
     pub(in crate::store) async fn open_postgres(url: &str) -> Result<Pool, Error> {
         let options = PgConnectOptions::from_str(url)?.application_name("flockreel");
+        wait_for_server(&options).await?;
         let pool = PgPoolOptions::new().max_connections(POSTGRES_CONNECTIONS);
         let pool = match pool.clone().connect_with(options.clone()).await {
             Err(sqlx::Error::Database(error))
@@ -182,6 +196,68 @@ fn options(file: &Path) -> SqliteConnectOptions {
         .synchronous(SqliteSynchronous::Full)
         .foreign_keys(true)
         .busy_timeout(Duration::from_secs(5))
+}
+
+/// Returns the error with the name of the file, unless the disk is full.
+fn unusable(file: &Path, error: Error) -> Error {
+    match error.code() {
+        Code::StorageFull => error,
+        _ => Error::at(file)(io::Error::other(error)),
+    }
+}
+
+/// Waits until a server accepts connections. Logs after each failed attempt, and every few seconds, how long it
+/// waits. Fails after [`MAX_SERVER_WAIT`]. Errors that waiting does not cure are left to the caller.
+async fn wait_for_server(options: &PgConnectOptions) -> Result<(), Error> {
+    let place = match options.get_socket() {
+        Some(socket) => socket.display().to_string(),
+        None => format!("{}:{}", options.get_host(), options.get_port()),
+    };
+    let start = Instant::now();
+    let left = || MAX_SERVER_WAIT.saturating_sub(start.elapsed());
+    let say = |cause: &str| {
+        tracing::warn!(
+            "waiting for the database at {place}, {} s left: {cause}",
+            left().as_secs()
+        );
+    };
+    let mut cause = "no answer yet".to_owned();
+    while !left().is_zero() {
+        let mut attempt = pin!(PgConnection::connect_with(options));
+        let attempted = loop {
+            match timeout(SERVER_RETRY.min(left()), &mut attempt).await {
+                Ok(attempted) => break Some(attempted),
+                Err(_) if left().is_zero() => break None,
+                Err(_) => say(&cause),
+            }
+        };
+        match attempted {
+            Some(Err(error)) if is_cured_by_waiting(&error) => {
+                cause = error.to_string();
+                say(&cause);
+                sleep(SERVER_RETRY.min(left())).await;
+            }
+            Some(Ok(connection)) => {
+                // The server answers, whatever happens to this connection.
+                connection.close().await.ok();
+                return Ok(());
+            }
+            Some(Err(_)) => return Ok(()),
+            None => {}
+        }
+    }
+    Err(Error::Unreachable { place, cause })
+}
+
+/// Returns whether a server that is starting may cause the error.
+fn is_cured_by_waiting(error: &sqlx::Error) -> bool {
+    match error {
+        sqlx::Error::Io(_) => true,
+        sqlx::Error::Database(error) => {
+            BUSY_SERVER.contains(&error.code().as_deref().unwrap_or_default())
+        }
+        _ => false,
+    }
 }
 
 /// Creates the database. Succeeds also if another process has created it.

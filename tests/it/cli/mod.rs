@@ -2,6 +2,8 @@
 //! (docs/reference/command-line.md). The results of its commands are tested in `film`.
 
 mod doctor;
+mod json_log;
+mod start;
 mod stderr;
 mod upkeep;
 

@@ -15,29 +15,30 @@ use crate::common::{Place, client};
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A running service with a given stderr.
-struct Service {
+pub(super) struct Service {
     child: Child,
-    base: String,
+    pub(super) base: String,
     _place: Place,
 }
 
 impl Service {
     /// Starts the service and waits until it responds.
     async fn start(stderr: impl Into<Stdio>, filter: &str) -> Service {
-        Service::start_with(Stdio::null(), stderr, filter).await
+        Service::start_with(Stdio::null(), stderr, &["--log", filter]).await
     }
 
-    async fn start_with(
+    pub(super) async fn start_with(
         stdout: impl Into<Stdio>,
         stderr: impl Into<Stdio>,
-        filter: &str,
+        flags: &[&str],
     ) -> Service {
         let place = Place::local();
         let free = TcpListener::bind("127.0.0.1:0").unwrap();
         let bind = free.local_addr().unwrap().to_string();
         drop(free);
         let child = Command::new(env!("CARGO_BIN_EXE_flockreel"))
-            .args(["serve", "--no-sample", "--log", filter, "--bind", &bind])
+            .args(["serve", "--no-sample", "--bind", &bind])
+            .args(flags)
             .args(place.flags())
             .stdout(stdout)
             .stderr(stderr)
@@ -90,7 +91,7 @@ impl Service {
     }
 
     /// Sends SIGTERM, waits for the end and returns the exit code.
-    fn terminate(&mut self) -> Option<i32> {
+    pub(super) fn terminate(&mut self) -> Option<i32> {
         kill_process(Pid::from_child(&self.child), Signal::TERM).unwrap();
         let start = Instant::now();
         loop {
@@ -111,7 +112,7 @@ impl Drop for Service {
     }
 }
 
-fn read_all(mut stderr: PipeReader) -> String {
+pub(super) fn read_all(mut stderr: PipeReader) -> String {
     let mut text = String::new();
     stderr.read_to_string(&mut text).unwrap();
     text
@@ -141,7 +142,7 @@ async fn stalled_reader_of_stderr_does_not_delay_responses() {
     let (reader, stderr) = pipe().unwrap();
     // Both streams go to the stalled reader, as with `2>&1`.
     let stdout = stderr.try_clone().unwrap();
-    let mut service = Service::start_with(stdout, stderr, "trace").await;
+    let mut service = Service::start_with(stdout, stderr, &["--log", "trace"]).await;
     let start = Instant::now();
     while service.n_lost_lines().await == 0 {
         service.assert_answers(50).await;

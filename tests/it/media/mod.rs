@@ -8,6 +8,7 @@ pub(crate) mod corpus;
 mod good;
 mod gray;
 mod headers;
+mod index;
 mod kinds;
 mod pictures;
 mod real;

@@ -50,13 +50,15 @@ fn has_heading(document: &str, heading: &str) -> bool {
 fn cited_documents_and_headings_exist() {
     let mut faults = Vec::new();
     let folders = [
-        "src", "crates", "tests", "benches", "bench", "docs", "scripts", "static",
+        "src", "crates", "tests", "benches", "bench", "docs", "deploy", "scripts", "static",
     ];
     let pages = [
         "README.md",
         "ARCHITECTURE.md",
         "CONTRIBUTING.md",
         "Makefile",
+        "SECURITY.md",
+        "Dockerfile",
     ];
     let below = folders.iter().flat_map(|folder| files(folder));
     for file in below.chain(pages.map(str::to_owned)) {

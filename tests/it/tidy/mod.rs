@@ -4,6 +4,7 @@
 
 mod citations;
 mod cycles;
+mod deploy;
 mod guards;
 mod imports;
 mod reading;
