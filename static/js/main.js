@@ -32,8 +32,8 @@ function startTheme() {
   const isDark = () => (document.documentElement.style.colorScheme || (system.matches ? "dark" : "light")) === "dark";
   const use = (/** @type {string} */ theme) => {
     document.documentElement.style.colorScheme = theme;
-    button.setAttribute("aria-label", say(isDark() ? "theme.light" : "theme.dark"));
-    button.title = button.getAttribute("aria-label");
+    button.title = say(isDark() ? "theme.light" : "theme.dark");
+    button.setAttribute("aria-label", button.title);
     dispatchEvent(new Event("theme"));
   };
   use(localStorage.getItem("flockreel-theme") ?? "");

@@ -4,7 +4,7 @@ import { say } from "./words.js";
 
 /** An error as a problem document of the service (RFC 9457). */
 export class Problem extends Error {
-  /** @param {{title?: string, detail?: string, code?: string, advice?: string, picture?: string | null, status?: number}} body */
+  /** @param {Partial<Api.Schemas["ProblemBody"]> & {picture?: string | null}} body */
   constructor(body) {
     super(body.title ?? say("problem.title"));
     this.title = this.message;
@@ -55,21 +55,22 @@ async function call(method, path, options) {
   return text ? JSON.parse(text) : null;
 }
 
-/** @param {string} path @param {AbortSignal} [signal] */
+/** @template {Api.Address<"get">} P @param {P} path @param {AbortSignal} [signal] @returns {Promise<Api.Json<"get", P>>} */
 export const get = (path, signal) => call("GET", path, { signal });
-/** @param {string} path @param {unknown} [body] @param {AbortSignal} [signal] */
+/** @template {Api.Address<"post">} P @param {P} path @param {Api.Body<"post", P>} [body] @param {AbortSignal} [signal] @returns {Promise<Api.Json<"post", P>>} */
 export const post = (path, body, signal) => call("POST", path, { body, signal });
-/** @param {string} path @param {unknown} body */
+/** @template {Api.Address<"patch">} P @param {P} path @param {Api.Body<"patch", P>} body @returns {Promise<Api.Json<"patch", P>>} */
 export const patch = (path, body) => call("PATCH", path, { body });
-/** @param {string} path */
+/** @param {Api.Address<"delete">} path */
 export const remove = (path) => call("DELETE", path);
 
 /**
  * Returns the items of a list, newest first, and the address of the next page.
- * @param {string} path @param {AbortSignal} [signal] @returns {Promise<{items: any[], next: string | null}>}
+ * @template {Api.Address<"get">} P
+ * @param {P} path @param {AbortSignal} [signal] @returns {Promise<{items: Api.Item<P>[], next: Api.Next<P>}>}
  */
 export async function list(path, signal) {
-  const page = await get(path, signal);
+  const page = await call("GET", path, { signal });
   const url = new URL(path, location.origin);
   url.searchParams.set("cursor", page.next_cursor);
   return { items: page.items, next: page.next_cursor && url.pathname + url.search };

@@ -2,8 +2,13 @@
 // @ts-check
 
 /**
+ * @typedef {Api.Job | {id: string}} Heard a job; with only its id if it was deleted
+ * @typedef {{job?: Heard, live: boolean}} Message not `live` while disconnected
+ */
+
+/**
  * Opens the stream, and opens it again when it breaks.
- * @param {(message: {job?: any, live: boolean}) => void} tell receives events; not `live` while disconnected
+ * @param {(message: Message) => void} tell receives events
  * @returns {() => void} closes the stream
  */
 export function openEvents(tell) {

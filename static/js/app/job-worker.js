@@ -17,7 +17,7 @@ let live = false;
   };
 };
 
-/** @param {{live: boolean, job?: any}} message */
+/** @param {import("./job-events.js").Message} message */
 function tellAll(message) {
   live = message.live;
   for (const tab of tabs) tab.postMessage(message);

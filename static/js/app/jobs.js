@@ -9,17 +9,17 @@ const RETRY_MS = 3000;
 /** Number of jobs that the page keeps, besides all that are under way. */
 const KEPT = 100;
 
-/** The newest jobs, newest first. @type {import("./store.js").Signal<any[]>} */
-export const jobs = signal(/** @type {any[]} */ ([]));
+/** The newest jobs, newest first. */
+export const jobs = signal(/** @type {Api.Job[]} */ ([]));
 /** Whether the service has answered at least once. */
 export const ready = signal(false);
 /** Waits until the jobs are known. @param {AbortSignal} life @returns {Promise<void>} */
 export const whenReady = (life) => new Promise((resolve) => ready.watch((isReady) => { if (isReady) resolve(); }, life));
-/** Uploads of this tab, newest first. @type {import("./store.js").Signal<import("./upload.js").Upload[]>} */
-export const uploads = signal(/** @type {any[]} */ ([]));
+/** Uploads of this tab, newest first. */
+export const uploads = signal(/** @type {import("./upload.js").Upload[]} */ ([]));
 let live = false;
 
-/** @param {any} job */
+/** @param {Api.Job} job */
 export const isUnderWay = (job) => job.state === "queued" || job.state === "running";
 
 /** Time after which the event stream opens, ms: the flock of Home comes first. Until then, the page polls. */
@@ -51,10 +51,10 @@ function listen() {
 
 /** Time at which a job was last heard of, ms. An answer to an earlier request knows less. @type {Map<string, number>} */
 const heard = new Map();
-/** @param {any} job @param {number} since_ms */
+/** @param {{id: string}} job @param {number} since_ms */
 const isHeard = ({ id }, since_ms) => (heard.get(id) ?? -1) >= since_ms;
 
-/** @param {any[]} all */
+/** @param {Api.Job[]} all */
 function keep(all) {
   // Ids grow with the time at which they were made.
   const sorted = all.sort((a, b) => (a.id < b.id ? 1 : -1));
@@ -66,10 +66,10 @@ async function reload() {
   const { items } = await get(`/v1/jobs?limit=${KEPT}`);
   const oldest = items.length < KEPT ? "" : items[KEPT - 1].id;
   const others = jobs.value.filter((job) => isHeard(job, begun_ms) || job.id < oldest);
-  keep([...items.filter((/** @type {any} */ item) => !isHeard(item, begun_ms)), ...others]);
+  keep([...items.filter((item) => !isHeard(item, begun_ms)), ...others]);
 }
 
-/** @param {{job?: any, live: boolean}} message */
+/** @param {import("./job-events.js").Message} message */
 function hear(message) {
   const returned = message.live && !live;
   live = message.live;
@@ -78,11 +78,11 @@ function hear(message) {
   if (message.job) merge(message.job);
 }
 
-/** @param {any} job with only its id if it was deleted */
+/** @param {import("./job-events.js").Heard} job */
 function merge(job) {
   heard.set(job.id, performance.now());
   const others = jobs.value.filter((other) => other.id !== job.id);
-  keep(job.state ? [job, ...others] : others);
+  keep("state" in job ? [job, ...others] : others);
 }
 
 /** Adds a job that this page has just started, before the stream tells of it. @param {string} id */
@@ -94,8 +94,8 @@ export async function expect(id) {
 
 /**
  * Waits until a job has ended.
- * @param {string} id @param {AbortSignal} life @param {(job: any) => void} [onChange] hears every state
- * @returns {Promise<any>} the job when it is done; throws a Problem if it failed, an AbortError if it was cancelled or deleted
+ * @param {string} id @param {AbortSignal} life @param {(job: Api.Job) => void} [onChange] hears every state
+ * @returns {Promise<Api.Job>} the job when it is done; throws a Problem if it failed, an AbortError if it was cancelled or deleted
  */
 export function ended(id, life, onChange = () => {}) {
   const waiting = new AbortController();
@@ -118,7 +118,7 @@ export function ended(id, life, onChange = () => {}) {
   }).finally(() => waiting.abort());
 }
 
-/** Returns the number of jobs that come before a job that waits, as far as this person sees them. @param {any} job */
+/** Returns the number of jobs that come before a job that waits, as far as this person sees them. @param {Api.Job} job */
 export const aheadOf = (job) => jobs.value.filter((other) => isUnderWay(other) && other.id < job.id).length;
 
 /** @param {string} id */
@@ -127,9 +127,13 @@ export const cancel = (id) => remove(`/v1/jobs/${id}`);
 /** Starts a failed or cancelled job again. @param {string} id */
 export const retry = async (id) => merge(await post(`/v1/jobs/${id}/retry`));
 
-/** Returns the id of the result of a job. @param {any} job @returns {string} */
-export const resultOf = (job) => job.links.result.split("/").at(-1);
+/** Returns the id of the result of a job. @param {Api.Job} job */
+export const resultOf = (job) => job.links.result.split("/").at(-1) ?? "";
 
+/** Returns the id of what a job works on; empty for the sample, which works on nothing. @param {Api.Job} job */
+export const subjectIdOf = (job) => job.subject?.id ?? "";
+
+/** @type {Record<string, string>} */
 const PLACES = { analysis: "/libraries/", flock: "/flocks/", sample: "/films/" };
-/** Returns the address at which the page shows the result of a job. @param {any} job */
-export const addressOf = (job) => (job.kind === "fish" ? `/libraries/${job.subject?.id}/fish?fish=${resultOf(job)}` : /** @type {any} */ (PLACES)[job.kind] + resultOf(job));
+/** Returns the address at which the page shows the result of a job. @param {Api.Job} job */
+export const addressOf = (job) => (job.kind === "fish" ? `/libraries/${subjectIdOf(job)}/fish?fish=${resultOf(job)}` : PLACES[job.kind] + resultOf(job));

@@ -1,49 +1,52 @@
 // Names of films, for jobs and flocks that only know an id.
 // @ts-check
 import { get, list } from "./api.js";
-import { jobs, resultOf } from "./jobs.js";
+import { jobs, resultOf, subjectIdOf } from "./jobs.js";
 import { say } from "./words.js";
 
-/** @type {Map<string, Promise<any>>} */
+/** @type {Map<string, Promise<Api.Things[keyof Api.Things]>>} */
 const known = new Map();
 
-/** Returns a footage, library or flock; asks the service once. @param {"footage" | "libraries" | "flocks"} kind @param {string} id */
+/**
+ * Returns a footage, library or flock; asks the service once.
+ * @template {keyof Api.Things} K @param {K} kind @param {string} id @returns {Promise<Api.Things[K]>}
+ */
 export function thing(kind, id) {
-  const path = `/v1/${kind}/${id}`;
+  const path = /** @type {`/v1/${keyof Api.Things}/${string}`} */ (`/v1/${kind}/${id}`);
   if (!known.has(path)) {
     const asked = get(path);
     asked.catch(() => known.delete(path));
     known.set(path, asked);
   }
-  return /** @type {Promise<any>} */ (known.get(path));
+  return /** @type {Promise<Api.Things[K]>} */ (known.get(path));
 }
 
 /** Forgets a thing that was deleted. @param {string} path */
 export const forget = (path) => known.delete(path);
 
-/** Keeps the things of a list, so that they need not be asked for one by one. @param {string} kind @param {any[]} items */
+/** Keeps the things of a list, so that they need not be asked for one by one. @param {keyof Api.Things} kind @param {Api.Things[keyof Api.Things][]} items */
 export function remember(kind, items) {
   for (const item of items) known.set(`/v1/${kind}/${item.id}`, Promise.resolve(item));
 }
 
-/** Returns the name of a film as a person would write it, or "film". @param {any} one footage or library */
+/** Returns the name of a film as a person would write it, or "film". @param {Api.Footage | Api.Library | null} one */
 export function filmName(one) {
   if (one?.sample) return say("film.sample");
   return (one?.name || "").replace(/\.[a-z0-9]{2,5}$/i, "").replaceAll("_", " ").trim() || say("film.unnamed");
 }
 
-/** Lists of the last moment, by kind. @type {Map<string, Promise<{items: any[], next: string | null}>>} */
+/** Lists of the last moment, by kind. @type {Map<string, Promise<{items: (Api.Footage | Api.Library)[], next: string | null}>>} */
 const listing = new Map();
 
 /**
  * Returns a thing that may be deleted: the list of its kind tells whether it exists, so that nothing missing
  * is asked for. Fails if the service does not answer.
- * @param {"footage" | "libraries"} kind @param {string} id @returns {Promise<any>} null if it is gone
+ * @template {"footage" | "libraries"} K @param {K} kind @param {string} id @returns {Promise<Api.Things[K] | null>} null if it is gone
  */
 async function existing(kind, id) {
   const path = `/v1/${kind}/${id}`;
   if (!known.has(path)) {
-    const asked = listing.get(kind) ?? list(`/v1/${kind}?limit=100`).then((page) => { remember(kind, page.items); return page; });
+    const asked = listing.get(kind) ?? list(/** @type {`/v1/${"footage" | "libraries"}?${string}`} */ (`/v1/${kind}?limit=100`)).then((page) => { remember(kind, page.items); return page; });
     listing.set(kind, asked);
     const { items: [newest], next } = await asked.finally(() => setTimeout(() => listing.delete(kind), 1000));
     // Ids grow with time: the list does not know what is younger.
@@ -59,18 +62,18 @@ async function existing(kind, id) {
 /**
  * Returns the film that a job works on: its name, the address of a picture if there is one, and
  * whether it was deleted or never made. Fails if the service does not answer.
- * @param {any} job @returns {Promise<{name: string, poster: string, isGone: boolean}>}
+ * @param {Api.Job} job @returns {Promise<{name: string, poster: string, isGone: boolean}>}
  */
 export async function subjectOf(job) {
   if (!job.subject) return { name: say("film.sample"), poster: "", isGone: false };
   // What a job works on does not exist before the job that makes it is done.
-  const maker = jobs.value.find((other) => other.id !== job.id && resultOf(other) === job.subject.id);
+  const maker = jobs.value.find((other) => other.id !== job.id && resultOf(other) === subjectIdOf(job));
   if (maker && maker.state !== "done") return { name: (await subjectOf(maker)).name, poster: "", isGone: true };
   const kind = job.subject.kind === "footage" ? "footage" : "libraries";
-  const one = await existing(kind, job.subject.id);
-  const libraryId = kind === "libraries" ? job.subject.id : job.kind === "analysis" && job.state === "done" && (await existing("libraries", resultOf(job)))?.id;
+  const one = await existing(kind, subjectIdOf(job));
+  const libraryId = kind === "libraries" ? subjectIdOf(job) : job.kind === "analysis" && job.state === "done" && (await existing("libraries", resultOf(job)))?.id;
   return { name: one ? filmName(one) : say("film.deleted"), poster: one && libraryId ? `/v1/libraries/${libraryId}/poster.jpg` : "", isGone: !one };
 }
 
-/** Returns the library of a flock, null if it was deleted. Fails if the service does not answer. @param {any} flock */
+/** Returns the library of a flock, null if it was deleted. Fails if the service does not answer. @param {Api.Flock} flock */
 export const libraryOf = (flock) => existing("libraries", flock.library_id);

@@ -41,7 +41,7 @@ const forget = (upload) => uploads.set(uploads.value.filter((other) => other !==
 
 /**
  * Sends a film. Its card in the tray shows the progress.
- * @param {File} file @returns {Promise<any>} the footage; an AbortError if the person cancelled
+ * @param {File} file @returns {Promise<Api.Footage>} the footage; an AbortError if the person cancelled
  */
 export async function send(file) {
   const stop = new AbortController();
@@ -67,7 +67,7 @@ export async function send(file) {
 /** @param {Upload} upload @param {number} sent @param {number} total */
 const report = (upload, sent, total) => update(upload, { sent, total, state: sent < total ? "sending" : "checking" });
 
-/** @param {File} file @param {Upload} upload @param {AbortSignal} stop */
+/** @param {File} file @param {Upload} upload @param {AbortSignal} stop @returns {Promise<Api.Footage>} */
 function sendAtOnce(file, upload, stop) {
   return new Promise((resolve, reject) => {
     // fetch reports no progress of an upload.
@@ -86,7 +86,10 @@ function sendAtOnce(file, upload, stop) {
   });
 }
 
-/** @param {any} tus @param {File} file @param {Upload} upload @param {AbortSignal} stop */
+/**
+ * @param {Pick<typeof import("/vendor/tus.js"), "Upload">} tus @param {File} file @param {Upload} upload @param {AbortSignal} stop
+ * @returns {Promise<Api.Footage>}
+ */
 function sendInPieces(tus, file, upload, stop) {
   return new Promise((resolve, reject) => {
     let address = "";
@@ -96,21 +99,21 @@ function sendInPieces(tus, file, upload, stop) {
       chunkSize: PIECE_BYTES,
       retryDelays: [0, 500, 1000, 2000, 4000, 8000, 16000, 30000],
       removeFingerprintOnSuccess: true,
-      onProgress: (/** @type {number} */ sent, /** @type {number} */ total) => report(upload, sent, total),
+      onProgress: (sent, total) => report(upload, sent, total),
       // The response to the last piece names the footage.
-      onAfterResponse: (/** @type {any} */ _, /** @type {any} */ response) => { address = /<([^>]+)>/.exec(response.getHeader("Link") ?? "")?.[1] ?? address; },
-      onError: (/** @type {any} */ error) => {
-        const response = error.originalResponse;
+      onAfterResponse: (_, response) => { address = /<([^>]+)>/.exec(response.getHeader("Link") ?? "")?.[1] ?? address; },
+      onError: (error) => {
+        const response = "originalResponse" in error && error.originalResponse;
         reject(response ? problemFrom(response.getBody(), response.getStatus()) : unreachable());
       },
-      onSuccess: () => get(address).then(resolve, reject),
+      onSuccess: () => get(/** @type {`/v1/footage/${string}`} */ (address)).then(resolve, reject),
     });
     stop.addEventListener("abort", () => {
       reject(stop.reason);
       // The service forgets what was sent; if it cannot be reached, it does so by itself after a while.
       sending.abort(true).catch(() => {});
     });
-    sending.findPreviousUploads().then((/** @type {any[]} */ former) => {
+    sending.findPreviousUploads().then((former) => {
       if (stop.aborted) return;
       if (former[0]) sending.resumeFromPreviousUpload(former[0]);
       sending.start();

@@ -13,7 +13,7 @@ function chosen() {
 }
 
 export const language = chosen();
-/** @type {Record<string, any>} */
+/** @type {Record<string, string | Record<string, string>>} */
 const table = (await import(`../../words/${language}.js`)).default;
 document.documentElement.lang = language;
 
@@ -94,7 +94,7 @@ export function direction(heading_rad) {
 /** Returns a heading as text, such as "34° (down right)". @param {number} heading_rad */
 export const heading = (heading_rad) => `${whole.format(degrees(heading_rad)).replace("-", "−")}° (${direction(heading_rad)})`;
 
-/** Returns the current stage of a job as text. @param {any} job */
+/** Returns the current stage of a job as text. @param {Api.Job} job */
 export function stageOf(job) {
   if (job.state !== "running") return say(`state.${job.state}`);
   if (job.cancel_requested) return say("state.cancelling");

@@ -13,7 +13,7 @@ const SIDE = 192;
 
 /**
  * Returns the picture of an advice, or null if it has none.
- * @param {string} code @param {{desk: import("./instrument.js").Instrument, pictures: any, shoot: (shot: import("./shots.js").Shot) => HTMLElement}} parts
+ * @param {string} code @param {{desk: import("./instrument.js").Instrument, pictures: import("./pictures.js").Pictures, shoot: (shot: import("./shots.js").Shot) => HTMLElement}} parts
  */
 export function pictureOf(code, { desk, pictures, shoot }) {
   const { columns: { value: columns }, facts: { value: facts }, first } = desk;
@@ -44,7 +44,7 @@ function playableBar({ facts: { value: facts }, first, last }) {
   return element("figure.playable", {}, picture, element("figcaption", {}, say("desk.advice.playable")));
 }
 
-/** The two moments of the jump with the greatest distance. @param {import("./instrument.js").Instrument} desk @param {any} pictures */
+/** The two moments of the jump with the greatest distance. @param {import("./instrument.js").Instrument} desk @param {import("./pictures.js").Pictures} pictures */
 function loosest(desk, pictures) {
   const { facts: { value: facts } } = desk;
   const worst = facts?.jumps.at(-1);

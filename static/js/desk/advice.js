@@ -8,7 +8,7 @@ import { pictureOf } from "./advice-picture.js";
 /**
  * Buttons that mend, by the code of the advice: settings to begin "Measure again" with, the tool to point with,
  * or a tab to show.
- * @type {Record<string, {name: string, params?: any, tool?: string, tab?: string}>}
+ * @type {Record<string, {name: string, params?: Api.AnalysisChanges, tool?: string, tab?: string}>}
  */
 const MENDS = {
   several_animals: { name: "point", tool: "animal" },
@@ -25,18 +25,18 @@ const SHOWN_ELSEWHERE = ["view_unsure", "other_movers"];
 /** Most cards of other things that move. */
 const MOST_MOVERS = 6;
 
-/** @typedef {{remeasure: (tool?: string, params?: any) => void, showTab: (tab: string) => void}} Acts */
+/** @typedef {{remeasure: (tool?: string, params?: Api.AnalysisChanges) => void, showTab: (tab: string) => void}} Acts */
 
-/** Returns the cards, which appear when the measurement is loaded. @param {import("./instrument.js").Instrument} desk @param {{pictures: any, shoot: any, acts: Acts}} parts */
+/** Returns the cards, which appear when the measurement is loaded. @param {import("./instrument.js").Instrument} desk @param {{pictures: import("./pictures.js").Pictures, shoot: import("./shots.js").Shoot, acts: Acts}} parts */
 export function adviceCards(desk, { pictures, shoot, acts }) {
   const { library, life } = desk;
   const list = element("ul.advices", {}, element("li.soft", {}, say("desk.reading.wait")));
   desk.isLoaded.watch((isLoaded) => {
     if (!isLoaded) return;
     const movers = (desk.head.value?.other_movers ?? []).slice(0, MOST_MOVERS);
-    const told = (library.advice ?? []).filter((/** @type {{code: string}} */ { code }) => !SHOWN_ELSEWHERE.includes(code));
-    list.replaceChildren(...told.map((/** @type {any} */ one) => adviceCard(desk, one, { pictures, shoot, acts })),
-      ...movers.map((/** @type {any} */ one) => moverCard(desk, one, shoot, acts)), viewCard(desk, shoot, acts));
+    const told = (library.advice ?? []).filter(({ code }) => !SHOWN_ELSEWHERE.includes(code));
+    list.replaceChildren(...told.map((one) => adviceCard(desk, one, { pictures, shoot, acts })),
+      ...movers.map((one) => moverCard(desk, one, shoot, acts)), viewCard(desk, shoot, acts));
   }, life);
   return list;
 }
@@ -45,7 +45,7 @@ export function adviceCards(desk, { pictures, shoot, acts }) {
 const card = (kind, picture, sentence, buttons) => element("li.advice", { className: `advice ${kind}` }, picture, element("p", {}, sentence),
   buttons.length > 0 && element("p.actions", {}, ...buttons.map(({ name, act }) => element("button.quiet", { type: "button", onclick: act }, say(`desk.mend.${name}`)))));
 
-/** @param {import("./instrument.js").Instrument} desk @param {{code: string, sentence: string}} advice @param {{pictures: any, shoot: any, acts: Acts}} parts */
+/** @param {import("./instrument.js").Instrument} desk @param {{code: string, sentence: string}} advice @param {{pictures: import("./pictures.js").Pictures, shoot: import("./shots.js").Shoot, acts: Acts}} parts */
 function adviceCard(desk, { code, sentence }, { pictures, shoot, acts }) {
   // A compass shows headings, not turns.
   const mend = /^lacks_.*(turn|straight)$/.test(code) ? MENDS.few_jumps : code.startsWith("lacks_") ? { name: "compass", tab: "pose" } : MENDS[code];
@@ -60,7 +60,7 @@ function sentenceOf({ library, facts, start_s, end_s }, code, sentence) {
   return sayOr(`desk.advice.${code}`, sentence.charAt(0).toUpperCase() + sentence.slice(1).replace(/([^.])$/, "$1."), values);
 }
 
-/** The view that was found, with a button that chooses the other view. @param {import("./instrument.js").Instrument} desk @param {any} shoot @param {Acts} acts */
+/** The view that was found, with a button that chooses the other view. @param {import("./instrument.js").Instrument} desk @param {import("./shots.js").Shoot} shoot @param {Acts} acts */
 function viewCard(desk, shoot, { remeasure }) {
   const { library, columns: { value: columns } } = desk;
   const sure = desk.head.value?.view_confidence;
@@ -71,10 +71,10 @@ function viewCard(desk, shoot, { remeasure }) {
   for (let k = desk.first; k <= desk.last() && k < columns.n; k++) if (columns.detected[k] && !columns.cut[k] && !(columns.length_px[k] <= columns.length_px[best])) best = k;
   const picture = shoot({ frame: best, label: say("desk.view.label", { view }), hasMarks: true, around_px: columns.detected[best] ? [...columns.box_px.subarray(4 * best, 4 * best + 4)] : undefined });
   const sentence = sure === undefined ? say("desk.view.given", { view }) : say("desk.view.guess", { view, share: percent(sure) });
-  return card(sure < 0.9 ? "is-advice" : "is-fact", picture, sentence, [{ name: other, act: () => remeasure("", { view: other }) }]);
+  return card(sure !== undefined && sure < 0.9 ? "is-advice" : "is-fact", picture, sentence, [{ name: other, act: () => remeasure("", { view: other }) }]);
 }
 
-/** One thing that moves besides the animal. @param {import("./instrument.js").Instrument} desk @param {{kind: string, from_s: number, to_s: number, box_px: number[]}} mover @param {any} shoot @param {Acts} acts */
+/** One thing that moves besides the animal. @param {import("./instrument.js").Instrument} desk @param {Api.Mover} mover @param {import("./shots.js").Shoot} shoot @param {Acts} acts */
 function moverCard(desk, { kind, from_s, to_s, box_px }, shoot, { remeasure }) {
   const frame = Math.min(desk.last(), Math.max(desk.first, desk.frameOf((from_s + to_s) / 2)));
   const [x, y, w, h] = box_px;

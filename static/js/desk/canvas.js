@@ -21,7 +21,7 @@ export function colorsAt(node) {
 
 /**
  * Returns a canvas that fills its parent's box and a function that asks for a drawing.
- * @param {AbortSignal} life @param {(paper: Paper) => void} draw @param {Record<string, any>} [props]
+ * @param {AbortSignal} life @param {(paper: Paper) => void} draw @param {Page.Props<HTMLCanvasElement>} [props]
  */
 export function drawnCanvas(life, draw, props = {}) {
   const canvas = element("canvas", { role: "img", ...props });
@@ -36,7 +36,7 @@ export function drawnCanvas(life, draw, props = {}) {
     const ratio = Math.min(3, devicePixelRatio || 1);
     const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
     if (canvas.width !== w || canvas.height !== h) [canvas.width, canvas.height] = [w, h];
-    colors ??= colorsAt(canvas.parentElement);
+    colors ??= colorsAt(canvas.parentElement ?? canvas);
     context.setTransform(w / width, 0, 0, h / height, 0, 0);
     context.clearRect(0, 0, width, height);
     context.save();

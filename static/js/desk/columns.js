@@ -8,7 +8,7 @@ export const MIDLINE = 11;
 /** Head confidence below which a heading counts as unsure. */
 export const SURE = 0.8;
 /** Names of the columns with one number a frame. */
-const SINGLE = ["confidence", "head_confidence", "heading_rad", "bend_rad", "length_px", "height_px"];
+const SINGLE = /** @type {const} */ (["confidence", "head_confidence", "heading_rad", "bend_rad", "length_px", "height_px"]);
 /** Half of the span over which the speed is measured, s. Shorter spans show the jitter of the silhouette. */
 const SPEED_HALF_S = 0.07;
 
@@ -24,20 +24,19 @@ const SPEED_HALF_S = 0.07;
 /** Returns empty columns for at most `most` frames. @param {number} most @param {number} fps @returns {Columns} */
 export function emptyColumns(most, fps) {
   const numbers = (/** @type {number} */ each) => new Float32Array(most * each).fill(NaN);
-  /** @type {any} */
   const columns = { n: 0, fps, hasMidline: false, mostSpeed: 0, mostBend: 0, mostBeat: 0, time_s: new Float64Array(most), detected: new Uint8Array(most), cut: new Uint8Array(most), centroid_px: numbers(2), box_px: numbers(4), midline_px: new Float32Array(0), speed_bl_per_s: numbers(1), tail_beat_hz: numbers(1), sure_deg: numbers(1), unsure_deg: numbers(1) };
-  for (const name of SINGLE) columns[name] = numbers(1);
-  return columns;
+  const single = Object.fromEntries(SINGLE.map((name) => [name, numbers(1)]));
+  return /** @type {Columns} */ ({ ...columns, ...single });
 }
 
-/** Appends one frame of poses.json. @param {Columns} columns @param {any} pose */
+/** Appends one frame of poses.json. @param {Columns} columns @param {Api.Pose} pose */
 export function append(columns, pose) {
   const k = columns.n;
   columns.n += 1;
   columns.time_s[k] = pose.time_s ?? k / columns.fps;
   columns.detected[k] = pose.detected ? 1 : 0;
   columns.cut[k] = pose.cut ? 1 : 0;
-  for (const name of SINGLE) /** @type {any} */ (columns)[name][k] = pose[name] ?? NaN;
+  for (const name of SINGLE) columns[name][k] = pose[name] ?? NaN;
   if (pose.centroid_px) columns.centroid_px.set(pose.centroid_px, 2 * k);
   if (pose.box_px) columns.box_px.set(pose.box_px, 4 * k);
   if (!pose.midline_px) return;
@@ -45,7 +44,7 @@ export function append(columns, pose) {
     columns.midline_px = new Float32Array(columns.time_s.length * 2 * MIDLINE).fill(NaN);
     columns.hasMidline = true;
   }
-  pose.midline_px.slice(0, MIDLINE).forEach((/** @type {number[]} */ point, /** @type {number} */ i) => columns.midline_px.set(point, 2 * (MIDLINE * k + i)));
+  pose.midline_px.slice(0, MIDLINE).forEach((point, i) => columns.midline_px.set(point, 2 * (MIDLINE * k + i)));
 }
 
 /**
@@ -85,7 +84,7 @@ export function measureRanges(columns) {
   columns.mostBeat = most(columns.tail_beat_hz);
 }
 
-/** Returns the first measured frame, at which film.mp4 begins. @param {any} library */
+/** Returns the first measured frame, at which film.mp4 begins. @param {Api.Library} library */
 export const firstFrame = ({ params, fps }) => Math.round((params?.from_s ?? 0) * fps);
 
 /** Returns the frame shown at a time. @param {Columns} columns @param {number} time_s */

@@ -6,7 +6,7 @@ import { emptyColumns, firstFrame, frameAt } from "./columns.js";
 
 /**
  * @typedef {{from: number, to: number, mirrored: boolean, distance: number}} Jump two clips that look alike
- * @typedef {{clip_frames: number, natural_step: number, stats: any, jumps: Jump[],
+ * @typedef {{clip_frames: number, natural_step: number, stats: Api.LibraryStats, jumps: Jump[],
  *   patches: {start: Int32Array, end: Int32Array}, leaps: {from: Int32Array, to: Int32Array, mirrored: Uint8Array}}} Facts
  *   of library.json; a leap is a jump that playback may take, sorted by its first frame
  * @typedef {ReturnType<typeof createInstrument>} Instrument
@@ -16,7 +16,7 @@ import { emptyColumns, firstFrame, frameAt } from "./columns.js";
 const LEAST_SPAN_S = 0.4;
 
 /**
- * @param {any} library @param {number} t the first moment, s @param {AbortSignal} life
+ * @param {Api.Library} library @param {number} t the first moment, s @param {AbortSignal} life
  */
 export function createInstrument(library, t, life) {
   // Frames keep the numbers of the whole film, but n_frames counts only the measured part, and film.mp4 begins with it.
@@ -31,8 +31,8 @@ export function createInstrument(library, t, life) {
   /** @type {import("../app/store.js").Signal<Facts | null>} */
   const facts = signal(/** @type {Facts | null} */ (null));
   /** Head of poses.json, without the frames. */
-  const head = signal(/** @type {any} */ (null));
-  const failure = signal(/** @type {any} */ (null));
+  const head = signal(/** @type {Api.PosesHead | null} */ (null));
+  const failure = signal(/** @type {import("../app/api.js").Problem | null} */ (null));
   const isLoaded = signal(false);
   /** What the time axis shows, s. */
   const span = signal([start_s, end_s]);
@@ -77,5 +77,5 @@ export function framesOf({ from, to, mirrored }, clipFrames) {
   return { from: from + half - 1, to: to + half, mirrored };
 }
 
-/** Returns whether a library has a file. Services that do not list files are asked for it. @param {any} library @param {string} name */
-export const hasFile = ({ files }, name) => !files || files.some((/** @type {any} */ file) => file.name === name);
+/** Returns whether a library has a file. Services that do not list files are asked for it. @param {Api.Library} library @param {string} name */
+export const hasFile = ({ files }, name) => !files || files.some((file) => file.name === name);

@@ -53,7 +53,11 @@ export function thinned(times, values, { from, to, most, turn = 0 }) {
   return line;
 }
 
-/** Ends a line at the border that the heading crosses, and begins it again at the other one. */
+/**
+ * Ends a line at the border that the heading crosses, and begins it again at the other one.
+ * @param {(x: number, y: number) => void} push
+ * @param {{last: number, lastTime: number, value: number, time: number, turn: number}} step
+ */
 function cut(push, { last, lastTime, value, time, turn }) {
   const side = last > 0 ? turn / 2 : -turn / 2;
   const share = (side - last) / (value + 2 * side - last || 1);
@@ -63,7 +67,7 @@ function cut(push, { last, lastTime, value, time, turn }) {
   push(at, -side);
 }
 
-/** Doubles the room of a line. */
+/** Doubles the room of a line. @param {Line} line */
 function grow(line) {
   const [x, y] = [new Float64Array(2 * line.n), new Float32Array(2 * line.n)];
   x.set(line.x);

@@ -15,7 +15,7 @@ page.onmessage = (/** @type {MessageEvent} */ { data }) => {
   load(data).then((message) => page.postMessage(message, buffersOf(message.columns)), (error) => page.postMessage({ failed: { status: error.status ?? 0, text: error.text ?? "" } }));
 };
 
-/** Returns the memory of the columns, which moves to the page without a copy. @param {any} columns */
+/** Returns the memory of the columns, which moves to the page without a copy. @param {import("./columns.js").Columns} columns */
 const buffersOf = (columns) => Object.values(columns).filter((one) => ArrayBuffer.isView(one)).map(({ buffer }) => buffer);
 
 /** @param {{base: string, most: number, fps: number, length_px: number | null}} asked base: address of the library */
@@ -54,6 +54,7 @@ async function loadPoses(address, columns, length_px) {
     pause_ms *= 2;
     next = performance.now() + pause_ms;
   }
+  /** @type {Api.PosesFile} */
   const { frames, ...facts } = JSON.parse(head);
   // A file that was written by another program may hold its frames otherwise.
   if (!columns.n && frames.length) {
@@ -80,11 +81,11 @@ function longer(old) {
 
 /** @param {string} address */
 async function loadLibrary(address) {
+  /** @type {Api.LibraryFile} */
   const { clip_frames, natural_step, stats, transitions, patches = [], playback = [] } = await (await fetched(address)).json();
-  const jumps = transitions.map((/** @type {any} */ one) => ({ from: one.from, to: one.to, mirrored: one.mirrored, distance: one.distance }))
-    .sort((/** @type {any} */ a, /** @type {any} */ b) => a.distance - b.distance).slice(0, MOST_JUMPS);
-  const column = (/** @type {any[]} */ rows, /** @type {(row: any) => number} */ of) => Int32Array.from(rows, of);
-  const found = { start: column(patches, (one) => one.start), end: column(patches, (one) => one.end) };
-  const leaps = { from: column(playback, ([from]) => from), to: column(playback, ([, to]) => to), mirrored: Uint8Array.from(playback, (row) => (row[3] ? 1 : 0)) };
+  const jumps = transitions.map((one) => ({ from: one.from, to: one.to, mirrored: one.mirrored, distance: one.distance }))
+    .sort((a, b) => a.distance - b.distance).slice(0, MOST_JUMPS);
+    const found = { start: Int32Array.from(patches, (one) => one.start), end: Int32Array.from(patches, (one) => one.end) };
+  const leaps = { from: Int32Array.from(playback, ([from]) => from), to: Int32Array.from(playback, ([, to]) => to), mirrored: Uint8Array.from(playback, (row) => (row[3] ? 1 : 0)) };
   page.postMessage({ library: { clip_frames, natural_step, stats, jumps, patches: found, leaps } });
 }

@@ -6,9 +6,11 @@ import { headOf, MIDLINE, SURE } from "./columns.js";
 /** Length of the trace, s. */
 const TRACE_S = 2;
 
+/** @typedef {import("./columns.js").Columns} Columns */
+
 /**
  * @param {CanvasRenderingContext2D} context scaled to pixels of the film
- * @param {import("./columns.js").Columns} columns @param {number} k the frame
+ * @param {Columns} columns @param {number} k the frame
  * @param {{zoom: number, colors: Record<string, string>, isMoving?: boolean}} look zoom: CSS pixels per pixel of the film
  */
 export function drawMarks(context, columns, k, { zoom, colors, isMoving = true }) {
@@ -34,8 +36,8 @@ export function drawMarks(context, columns, k, { zoom, colors, isMoving = true }
     for (let i = 0; i < MIDLINE; i++) context.lineTo(columns.midline_px[2 * (MIDLINE * k + i)], columns.midline_px[2 * (MIDLINE * k + i) + 1]);
     stroke(colors.water, 2.5);
   }
-  drawArrow(context, columns, k, unit, (dashed) => {
-    if (dashed) context.setLineDash([4 * unit, 5 * unit]);
+  drawArrow(context, columns, k, unit, (isDashed) => {
+    if (isDashed) context.setLineDash([4 * unit, 5 * unit]);
     stroke(colors.accent, 2.5);
   });
   const [cx, cy] = columns.centroid_px.subarray(2 * k, 2 * k + 2);
@@ -46,7 +48,10 @@ export function drawMarks(context, columns, k, { zoom, colors, isMoving = true }
   context.fill();
 }
 
-/** Draws the path of the last two seconds, fading into the past. */
+/**
+ * Draws the path of the last two seconds, fading into the past.
+ * @param {CanvasRenderingContext2D} context @param {Columns} columns @param {number} k @param {number} unit @param {Record<string, string>} colors
+ */
 function drawTrace(context, { fps, centroid_px: at }, k, unit, colors) {
   const from = Math.max(1, k - Math.round(TRACE_S * fps));
   context.strokeStyle = colors.accent;
@@ -62,7 +67,11 @@ function drawTrace(context, { fps, centroid_px: at }, k, unit, colors) {
   context.globalAlpha = 1;
 }
 
-/** Draws the head as a ring and the heading as an arrow; dashed if it is unsure. */
+/**
+ * Draws the head as a ring and the heading as an arrow; dashed if it is unsure.
+ * @param {CanvasRenderingContext2D} context @param {Columns} columns @param {number} k @param {number} unit
+ * @param {(isDashed: boolean) => void} stroke
+ */
 function drawArrow(context, columns, k, unit, stroke) {
   const angle = columns.heading_rad[k];
   const head = headOf(columns, k);

@@ -2,19 +2,22 @@
 // @ts-check
 import { element } from "../app/element.js";
 import { count, percent, say, sayOr, seconds } from "../app/words.js";
+import { at } from "../studio/settings.js";
 
-/** @typedef {{library: any, facts: any, head?: any}} Measured facts and head are null until they are loaded */
+/** @typedef {{key: string, value: string, values?: import("../app/words.js").Values}} Row */
+/** @typedef {{library: Api.Library, facts: {stats: Api.LibraryStats} | null, head?: Api.PosesHead | null}} Measured facts and head are null until they are loaded */
 
 /**
  * Returns the numbers: the key of the words, the value as text, and values for the words.
- * @param {Measured} measured @returns {{key: string, value: string, values?: any}[]}
+ * @param {Measured} measured @returns {Row[]}
  */
 function numbersOf({ library, facts, head = null }) {
   const stats = facts?.stats;
   const camera = library.params?.camera;
   const beat = head?.tail_beat?.spans?.[0];
   const speeds = stats?.speed_bl_per_s;
-  return /** @type {any[]} */ ([
+  /** @type {(Row | false | null | undefined | 0)[]} */
+  const rows = [
     { key: "frames", value: count(library.n_frames), values: { time: seconds(library.n_frames / library.fps), fps: library.fps } },
     { key: "seen", value: percent(library.detected_share) },
     { key: "view", value: say(`desk.view.${library.view}`) },
@@ -23,7 +26,8 @@ function numbersOf({ library, facts, head = null }) {
     beat && { key: "tail_beat", value: say("unit.hz", { n: beat.frequency_hz }) },
     { key: "jumps", value: count(library.n_transitions) },
     { key: "endless", value: percent(library.component_share) },
-  ].filter(Boolean));
+  ];
+  return rows.flatMap((row) => row || []);
 }
 
 /** Returns the list of numbers with what they mean. @param {Measured} measured */
@@ -44,10 +48,10 @@ export function comparison(before, after) {
 /** Returns the words for a setting. @param {string} name */
 export const settingName = (name) => sayOr(`remeasure.${name}`, name);
 
-/** Returns a row for each setting that differs. @param {any} before @param {any} after */
+/** Returns a row for each setting that differs. @param {Api.AnalysisParams} before @param {Api.AnalysisParams} after */
 function settingRows(before, after) {
-  const names = Object.keys(after).filter((name) => JSON.stringify(before[name] ?? null) !== JSON.stringify(after[name] ?? null));
-  return names.map((name) => element("tr.changed", {}, element("th", { scope: "row" }, settingName(name), " ", element("small", {}, say("desk.compare.setting"))), ...[before, after].map((params) => element("td", {}, settingWords(name, params[name])))));
+  const names = Object.keys(after).filter((name) => JSON.stringify(at(before, name) ?? null) !== JSON.stringify(at(after, name) ?? null));
+  return names.map((name) => element("tr.changed", {}, element("th", { scope: "row" }, settingName(name), " ", element("small", {}, say("desk.compare.setting"))), ...[before, after].map((params) => element("td", {}, settingWords(name, at(params, name))))));
 }
 
 /** Returns the value of a setting in words. @param {string} name @param {any} value */

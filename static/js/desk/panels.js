@@ -14,9 +14,11 @@ import { weakest } from "./weakest.js";
 
 const TABS = ["jumps", "patches", "pose", "trust", "size"];
 
+/** @typedef {import("./player.js").Player} Player @typedef {import("./shots.js").Shoot} Shoot */
+
 /**
  * @param {import("./instrument.js").Instrument} desk
- * @param {{player: any, pictures: any, shoot: any, tab: string, remeasure: (tool?: string) => void}} parts
+ * @param {{player: Player, pictures: import("./pictures.js").Pictures, shoot: Shoot, tab: string, remeasure: (tool?: string) => void}} parts
  */
 export function createPanels(desk, { player, pictures, shoot, tab, remeasure }) {
   const chosen = signal(TABS.includes(tab) ? tab : TABS[0]);
@@ -49,7 +51,7 @@ export function createPanels(desk, { player, pictures, shoot, tab, remeasure }) 
   return { node: element("div.panels", {}, list, ...panels), chosen };
 }
 
-/** The path over the background, and the compass. @param {import("./instrument.js").Instrument} desk @param {any} player */
+/** The path over the background, and the compass. @param {import("./instrument.js").Instrument} desk @param {Player} player */
 function pathPanel(desk, player) {
   const { library, life, moment, columns, facts } = desk;
   const size = library.image_size_px;
@@ -84,7 +86,7 @@ function pathPanel(desk, player) {
   return element("div.panel-pose", {}, element("div.path-box", {}, canvas), element("p.path-key", {}, element("span", {}, say("desk.path.start")), element("i"), element("span", {}, say("desk.path.end")), element("span.soft", {}, say("desk.path.help"))), compassBox);
 }
 
-/** Where the measurement is sure, and the moments to look at. @param {import("./instrument.js").Instrument} desk @param {{player: any, shoot: any, remeasure: (tool?: string) => void}} parts */
+/** Where the measurement is sure, and the moments to look at. @param {import("./instrument.js").Instrument} desk @param {{player: Player, shoot: Shoot, remeasure: (tool?: string) => void}} parts */
 function trustPanel(desk, { player, shoot, remeasure }) {
   const node = element("div.panel-trust", {}, element("p.soft", {}, say("desk.reading.wait")));
   const fill = () => {
@@ -98,7 +100,7 @@ function trustPanel(desk, { player, shoot, remeasure }) {
       return element("li", {}, element("button.quiet", { type: "button", onclick: () => { player.pause(); desk.goTo(frame); } }, shoot({ frame, label: words, hasMarks: true, around_px }), element("span", {}, words)));
     });
     node.replaceChildren(...[element("ul.shares", {}, ...bars), element("h3", {}, say("desk.trust.look")), moments.length ? element("ul.weak", {}, ...rows) : element("p.soft", {}, say("desk.trust.fine")),
-      moments.length > 0 && element("p.actions", {}, ...["head", "animal"].map((tool) => element("button.quiet", { type: "button", onclick: () => remeasure(tool) }, say(`desk.trust.${tool}_at`))))].filter(Boolean));
+      moments.length > 0 && element("p.actions", {}, ...["head", "animal"].map((tool) => element("button.quiet", { type: "button", onclick: () => remeasure(tool) }, say(`desk.trust.${tool}_at`)))) || ""]);
   };
   desk.isLoaded.watch(fill, desk.life);
   return node;

@@ -52,7 +52,11 @@ export function createMap(desk, { player }) {
     context.fillRect(xOf(moment.value + 0.5) - 1, 0, 2, height - LABELS);
   }
 
-  /** Draws the jumps of the window; those of the patch of the moment are strong. */
+  /**
+   * Draws the jumps of the window; those of the patch of the moment are strong.
+   * @param {CanvasRenderingContext2D} context @param {import("./instrument.js").Facts} facts
+   * @param {{from: number, length: number, xOf: (frame: number) => number, middle: number, current: number, colors: Record<string, string>}} look
+   */
   function drawLeaps(context, { leaps, patches }, { from, length, xOf, middle, current, colors }) {
     const last = current < 0 ? -1 : patches.end[current] - 1;
     const begin = lowerBound(leaps.from, Math.floor(from));

@@ -91,7 +91,7 @@ export function patchPanel(desk, { player, pictures, chosen }) {
     element("section", {}, element("h3", {}, say("desk.patch.longest")), longest));
 }
 
-/** Returns the heading of a patch over its time, as in figure 7.1; a mirrored patch is drawn mirrored. */
+/** Returns the heading of a patch over its time, as in figure 7.1; a mirrored patch is drawn mirrored. @param {import("./columns.js").Columns} columns @param {number} from @param {number} to @param {boolean} mirrored */
 function curveOf({ heading_rad }, from, to, mirrored) {
   const xOf = (/** @type {number} */ k) => (to - from < 2 ? WIDE / 2 : 3 + ((k - from) / (to - from - 1)) * (WIDE - 6));
   let path = "";

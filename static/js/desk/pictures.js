@@ -8,6 +8,7 @@ import { hasFile } from "./instrument.js";
 const AROUND = 1.25;
 
 /** @typedef {ReturnType<typeof createPictures>} Pictures */
+/** @typedef {{frame: number, canvas: HTMLCanvasElement, mirrored: boolean}} Wish */
 
 /** @param {import("./instrument.js").Instrument} desk */
 export function createPictures(desk) {
@@ -38,7 +39,7 @@ export function createPictures(desk) {
   // A second copy of the film shows other moments than the player's.
   /** @type {HTMLVideoElement | null} */
   let scout = null;
-  /** @type {{frame: number, canvas: HTMLCanvasElement, mirrored: boolean}[]} */
+  /** @type {Wish[]} */
   let wanted = [];
   const next = () => {
     const first = wanted[0];
@@ -50,6 +51,7 @@ export function createPictures(desk) {
     if (first) cut(first);
     next();
   };
+  /** @param {Wish} wish */
   function cut({ frame, canvas, mirrored }) {
     const { columns: { value: columns } } = desk;
     if (!scout || frame >= columns.n || !columns.detected[frame]) return;
@@ -61,14 +63,14 @@ export function createPictures(desk) {
     context.drawImage(scout, (x - side / 2) * zoom, (y - side / 2) * zoom, side * zoom, side * zoom, 0, 0, canvas.width, canvas.height);
   }
 
-  /** Fills small canvases with the animal of some frames; forgets earlier wishes. @param {{frame: number, canvas: HTMLCanvasElement, mirrored: boolean}[]} wishes */
+  /** Fills small canvases with the animal of some frames; forgets earlier wishes. @param {Wish[]} wishes */
   function fill(wishes) {
     for (const { canvas } of wishes) {
       const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
       context.setTransform(1, 0, 0, 1, 0, 0);
       context.clearRect(0, 0, canvas.width, canvas.height);
     }
-    const rest = wishes.filter(({ frame, canvas, mirrored }) => !drawSprite(/** @type {any} */ (canvas.getContext("2d")), frame, { x: canvas.width / 2, y: canvas.height / 2, zoom: zoomFor(canvas.width), mirrored }));
+    const rest = wishes.filter(({ frame, canvas, mirrored }) => !drawSprite(/** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d")), frame, { x: canvas.width / 2, y: canvas.height / 2, zoom: zoomFor(canvas.width), mirrored }));
     const isBusy = wanted.length > 0;
     wanted = [...wanted.slice(0, 1), ...rest];
     if (!rest.length || isBusy) return;

@@ -78,7 +78,7 @@ export function createPlayer(desk) {
       desk.goTo(to);
     }, 1000 / fps / rate);
   };
-  const onFrame = (/** @type {number} */ _, /** @type {any} */ { mediaTime }) => {
+  const onFrame = (/** @type {number} */ _, /** @type {VideoFrameCallbackMetadata} */ { mediaTime }) => {
     if (life.aborted) return;
     if (!isSeeking && !video.paused) step(desk.first + Math.round(mediaTime * fps));
     video.requestVideoFrameCallback(onFrame);

@@ -9,8 +9,9 @@ import { svgPlot } from "./plot-svg.js";
 import { LEFT, RIGHT, ticksOf } from "./time-axis.js";
 
 /**
- * @typedef {{values: (columns: any) => Float32Array, look: "sure" | "unsure" | "second", turn?: number}} Series
- * @typedef {{name: string, range: (columns: any) => number[], dir: 1 | -1, ticks: (range: number[]) => [number, string][], series: Series[]}} Plot
+ * @typedef {import("./columns.js").Columns} Columns
+ * @typedef {{values: (columns: Columns) => Float32Array, look: "sure" | "unsure" | "second", turn?: number}} Series
+ * @typedef {{name: string, range: (columns: Columns) => number[], dir: 1 | -1, ticks: (range: number[]) => [number, string][], series: Series[]}} Plot
  *   dir -1: greater values are lower
  * @typedef {{lines: import("./lines.js").Line[], span: number[], range: number[], ticks: number[], width: number}} Drawing
  * @typedef {{node: HTMLElement, draw: (drawing: Drawing) => void}} Plotter
@@ -79,8 +80,9 @@ export function createPlots(desk) {
   // Nothing is drawn twice: the plots wait for the answer whether uPlot was built.
   import("./plot-uplot.js").then(({ loadUplot }) => loadUplot()).catch(() => null).then((uplot) => {
     if (desk.life.aborted) return;
-    for (const row of uplot ? rows : []) {
-      const better = uplot(row.plot, desk.life);
+    for (const row of rows) {
+      const better = uplot?.(row.plot, desk.life);
+      if (!better) break;
       row.plotter.node.replaceWith(better.node);
       row.plotter = better;
     }

@@ -3,16 +3,19 @@
 import { element } from "../app/element.js";
 import { say, seconds } from "../app/words.js";
 
-/** @typedef {import("../app/store.js").Signal<any>} Draft */
+/**
+ * @typedef {import("../app/store.js").Signal<Api.AnalysisParams & {ignore: Api.Schemas["IgnoreParam"][]}>} Draft the parameters to be sent
+ * @typedef {{line_cm: number, away_cm: number, medium_index: number}} Measures of the ruler
+ */
 
-/** Returns a field that chooses one of some values. @param {Draft} draft @param {string} name @param {(string | null)[]} values */
+/** Returns a field that chooses one of some values. @param {Draft} draft @param {"view" | "follow" | "sprites"} name @param {(string | null)[]} values */
 export function choice(draft, name, values) {
   const select = element("select", { name, onchange: () => draft.set({ ...draft.value, [name]: values[select.selectedIndex] }) }, ...values.map((value) => element("option", { value: value ?? "" }, say(`remeasure.${name}.${value ?? "null"}`))));
   draft.watch((now) => { select.selectedIndex = values.indexOf(now[name] ?? null); });
   return element("label.field", {}, say(`remeasure.${name}`), select, element("small", {}, say(`remeasure.${name}.help`)));
 }
 
-/** Returns a slider. @param {Draft} draft @param {string} name @param {{min: number, max: number, step: number}} range */
+/** Returns a slider. @param {Draft} draft @param {"threshold" | "kappa"} name @param {{min: number, max: number, step: number}} range */
 export function slide(draft, name, range) {
   const output = element("output");
   const input = element("input", { type: "range", name, ...range, oninput: () => draft.set({ ...draft.value, [name]: input.valueAsNumber }) });
@@ -46,11 +49,11 @@ export function part(draft, desk) {
 }
 
 /**
- * Returns the fields of the ruler. @param {(name: string, value: number) => void} onChange
- * @param {Record<string, number>} values
+ * Returns the fields of the ruler. @param {(name: keyof Measures, value: number) => void} onChange
+ * @param {Measures} values
  */
 export function rulerFields(onChange, values) {
-  const number = (/** @type {string} */ name) => {
+  const number = (/** @type {"line_cm" | "away_cm"} */ name) => {
     const input = element("input", { type: "number", name, min: 0.1, step: "any", inputMode: "decimal", value: values[name] ? String(values[name]) : "", oninput: () => onChange(name, input.valueAsNumber) });
     return element("label.field", {}, say(`remeasure.${name}`), input, element("small", {}, say(`remeasure.${name}.help`)));
   };

@@ -3,11 +3,12 @@
 // @ts-check
 
 /**
- * @param {{draft: Record<string, any>, former: Record<string, any>, defaults: Record<string, any>, preset: string}} settings
+ * @param {{draft: Record<string, unknown>, former: Record<string, unknown>, defaults: Record<string, unknown>, preset: "" | "papers"}} settings
  *   With a preset, which replaces the defaults, only what the person changed is sent besides it.
+ * @returns {Api.AnalysisChanges}
  */
 export function changedParams({ draft, former, defaults, preset }) {
-  const isSame = (/** @type {any} */ a, /** @type {any} */ b) => JSON.stringify(a ?? null) === JSON.stringify(b ?? null);
+  const isSame = (/** @type {unknown} */ a, /** @type {unknown} */ b) => JSON.stringify(a ?? null) === JSON.stringify(b ?? null);
   // Parameters that the service no longer knows are dropped.
   const names = Object.keys(draft).filter((name) => name in defaults && !isSame(draft[name], preset ? former[name] : defaults[name]));
   return { ...(preset ? { preset } : {}), ...Object.fromEntries(names.map((name) => [name, draft[name]])) };

@@ -10,7 +10,7 @@ const LEAST_PX = 4;
 
 /**
  * @param {import("./instrument.js").Instrument} desk
- * @param {{video: HTMLVideoElement, isBroken: boolean, tool: import("../app/store.js").Signal<Tool>, draft: import("../app/store.js").Signal<any>, ruler: import("../app/store.js").Signal<number[][] | null>, life: AbortSignal}} parts
+ * @param {{video: HTMLVideoElement, isBroken: boolean, tool: import("../app/store.js").Signal<Tool>, draft: import("./remeasure-fields.js").Draft, ruler: import("../app/store.js").Signal<number[][] | null>, life: AbortSignal}} parts
  */
 export function createPicture(desk, { video, isBroken, tool, draft, ruler, life }) {
   const size = desk.library.image_size_px;
@@ -19,7 +19,7 @@ export function createPicture(desk, { video, isBroken, tool, draft, ruler, life 
   /** Start and end of what is being drawn, pixels of the film. @type {number[][] | null} */
   let drawing = null;
   /** Cross of the keyboard. */
-  let cross = size.map((/** @type {number} */ side) => side / 2);
+  let cross = size.map((side) => side / 2);
   let isKeyboard = false;
   const { canvas, ask } = drawnCanvas(life, draw, { tabIndex: 0, className: "remeasure-picture", role: "application", "aria-label": say("remeasure.picture") });
   canvas.style.aspectRatio = size.join(" / ");
@@ -41,11 +41,11 @@ export function createPicture(desk, { video, isBroken, tool, draft, ruler, life 
     }
     const line = drawing && tool.value === "ruler" ? drawing : ruler.value;
     if (line) drawRuler(context, line, zoom, colors);
-    for (const [point, color] of [[draft.value.animal_at?.at_px, colors.accent], [draft.value.head?.point, colors.water]]) if (point) drawTarget(context, point, color, zoom);
+    for (const { point, color } of [{ point: draft.value.animal_at?.at_px, color: colors.accent }, { point: draft.value.head?.point, color: colors.water }]) if (point) drawTarget(context, point, color, zoom);
     if (isKeyboard) drawTarget(context, cross, "#fff", zoom);
   }
 
-  /** @param {PointerEvent} event @returns {number[]} */
+  /** @param {MouseEvent} event @returns {number[]} */
   const pointOf = (event) => {
     const box = canvas.getBoundingClientRect();
     const { zoom, left, top } = fitted(size, box.width, box.height);
@@ -70,11 +70,11 @@ export function createPicture(desk, { video, isBroken, tool, draft, ruler, life 
   canvas.addEventListener("pointercancel", () => { drawing = null; ask(); });
   canvas.addEventListener("keydown", (event) => {
     const step = event.shiftKey ? 1 : 10;
-    const by = { ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] }[event.key];
+    const by = /** @type {Record<string, number[]>} */ ({ ArrowLeft: [-step, 0], ArrowRight: [step, 0], ArrowUp: [0, -step], ArrowDown: [0, step] })[event.key];
     if (!by && event.key !== "Enter") return;
     event.preventDefault();
     isKeyboard = true;
-    if (by) cross = cross.map((/** @type {number} */ value, /** @type {number} */ k) => Math.min(size[k], Math.max(0, value + by[k])));
+    if (by) cross = cross.map((value, k) => Math.min(size[k], Math.max(0, value + by[k])));
     else if (!drawing) { begin([...cross]); if (tool.value === "animal" || tool.value === "head") end(); } else end();
     if (drawing) drawing = [drawing[0], [...cross]];
     ask();
@@ -92,10 +92,10 @@ export function boxOf([a, b]) {
   return [x, y, Math.ceil(Math.max(a[0], b[0])) - x, Math.ceil(Math.max(a[1], b[1])) - y];
 }
 
-/** Draws a cross in a ring. */
+/** Draws a cross in a ring. @param {CanvasRenderingContext2D} context @param {number[]} point @param {string} color @param {number} zoom */
 function drawTarget(context, [x, y], color, zoom) {
   const unit = 1 / zoom;
-  for (const [style, wide] of [["rgb(10 17 20 / 0.7)", 5], [color, 2.5]]) {
+  for (const [style, wide] of /** @type {[string, number][]} */ ([["rgb(10 17 20 / 0.7)", 5], [color, 2.5]])) {
     context.strokeStyle = style;
     context.lineWidth = wide * unit;
     context.beginPath();

@@ -10,16 +10,18 @@ import { mendsOf } from "../parts/mend.js";
 import { problemBox, showProblem } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
 import { analysisDefaults } from "../studio/schema.js";
+import { at } from "../studio/settings.js";
 import { choice, part, rulerFields, slide } from "./remeasure-fields.js";
 import { changedParams, sizeFromRuler } from "./remeasure-params.js";
 import { createPicture } from "./remeasure-picture.js";
 import { comparison, settingName } from "./numbers.js";
 
+/** @type {import("./remeasure-picture.js").Tool[]} */
 const TOOLS = ["animal", "head", "ignore", "ruler"];
 
 /**
  * Opens the dialog. @param {import("./instrument.js").Instrument} desk
- * @param {{player: import("./player.js").Player, results: HTMLElement, tool?: string, params?: any}} options
+ * @param {{player: import("./player.js").Player, results: HTMLElement, tool?: string, params?: Api.AnalysisChanges}} options
  */
 export async function openRemeasure(desk, { player, results, tool: first = "animal", params = {} }) {
   const { library } = desk;
@@ -28,16 +30,16 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   const life = closing.signal;
   const defaults = await analysisDefaults();
   if (desk.life.aborted || document.querySelector("dialog.remeasure")) return;
-  const former = { ...defaults, ...library.params };
+  const former = /** @type {Api.AnalysisParams} */ ({ ...defaults, ...library.params });
   const draft = signal({ ...former, ...params, ignore: params.ignore ?? former.ignore ?? [] });
-  const tool = signal(/** @type {any} */ (TOOLS.includes(first) ? first : "animal"));
+  const tool = signal(TOOLS.find((one) => one === first) ?? "animal");
   const ruler = signal(/** @type {number[][] | null} */ (null));
   const picture = createPicture(desk, { video: player.video, isBroken: player.isBroken.value, tool, draft, ruler, life });
 
   const radios = TOOLS.map((name) => element("label.choice", {}, element("input", { type: "radio", name: "remeasure-tool", value: name, checked: name === tool.value, onchange: () => tool.set(name) }), element("span", {}, say(`remeasure.tool.${name}`))));
   const help = element("p.soft");
   const measures = { line_cm: 0, away_cm: former.camera ? 100 * former.camera.z_min_m : 0, medium_index: former.camera?.medium_index ?? (library.view === "side" ? 1.333 : 1) };
-  const size = element("div", {}, rulerFields((name, value) => { /** @type {any} */ (measures)[name] = value; applyRuler(); }, measures));
+  const size = element("div", {}, rulerFields((name, value) => { measures[name] = value; applyRuler(); }, measures));
   tool.watch((now) => { help.textContent = say(`remeasure.tool.${now}.help`); size.hidden = now !== "ruler"; }, life);
   const applyRuler = () => {
     if (!ruler.value || !(measures.line_cm > 0) || !(measures.away_cm > 0)) return;
@@ -48,8 +50,8 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   const frame = element("input", { type: "range", min: desk.first, max: desk.last(), step: 1, "aria-label": say("desk.frame"), oninput: () => desk.goTo(frame.valueAsNumber) });
   desk.moment.watch((now) => { frame.value = String(now); }, life);
 
-  let preset = "";
-  const presets = element("select", { name: "preset", onchange: () => { preset = presets.value; tell(); } }, ...["", "papers"].map((name) => element("option", { value: name }, say(`remeasure.preset.${name || "none"}`))));
+  let preset = /** @type {"" | "papers"} */ ("");
+  const presets = element("select", { name: "preset", onchange: () => { preset = presets.value === "papers" ? "papers" : ""; tell(); } }, ...["", "papers"].map((name) => element("option", { value: name }, say(`remeasure.preset.${name || "none"}`))));
   const marks = element("ul.remeasure-marks");
   const sent = element("p.soft", { role: "status" });
   const problem = element("div");
@@ -57,7 +59,7 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   const changes = () => changedParams({ draft: draft.value, former, defaults, preset });
   const tell = () => {
     marks.replaceChildren(...marksOf(draft));
-    const names = [...(preset ? ["preset"] : []), ...Object.keys(changes()).filter((name) => name !== "preset" && JSON.stringify(draft.value[name]) !== JSON.stringify(former[name]))];
+    const names = [...(preset ? ["preset"] : []), ...Object.keys(changes()).filter((name) => name !== "preset" && JSON.stringify(at(draft.value, name)) !== JSON.stringify(at(former, name)))];
     sent.textContent = names.length ? say("remeasure.sends", { names: names.map(settingName).join(", ") }) : say("remeasure.sends_none");
   };
   draft.watch(tell, life);
@@ -87,12 +89,15 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   document.body.append(dialog);
   desk.life.addEventListener("abort", () => dialog.close());
   dialog.showModal();
-  if (first === "part") form.elements.from_s.focus();
+  if (first === "part") /** @type {HTMLElement} */ (form.elements.namedItem("from_s")).focus();
 }
 
-/** Shows an analysis while it runs, and its numbers beside the former ones. @param {import("./instrument.js").Instrument} desk */
+/**
+ * Shows an analysis while it runs, and its numbers beside the former ones. @param {import("./instrument.js").Instrument} desk
+ * @param {{begun: Api.Schemas["AnalysisAccepted"], params: Api.AnalysisChanges, results: HTMLElement, player: import("./player.js").Player}} measurement
+ */
 async function follow(desk, { begun: { job_id: jobId, library_id: libraryId }, params, results, player }) {
-  const card = jobCard({ id: jobId, kind: "analysis", subject: { kind: "footage", id: desk.library.footage_id } });
+  const card = jobCard({ kind: "analysis" });
   results.replaceChildren(element("h2", {}, say("remeasure.title")), card);
   results.scrollIntoView({ block: "center" });
   try {
@@ -114,12 +119,12 @@ async function follow(desk, { begun: { job_id: jobId, library_id: libraryId }, p
 /** Returns the list of what was drawn, each with a button that removes it. @param {import("./remeasure-fields.js").Draft} draft */
 function marksOf(draft) {
   const { animal_at, head, ignore, camera, animal } = draft.value;
-  const row = (/** @type {string} */ text, /** @type {any} */ without) => element("li", {}, element("span", {}, text), element("button.quiet", { type: "button", "aria-label": say("remeasure.remove_one", { what: text }), onclick: () => draft.set({ ...draft.value, ...without }) }, say("remeasure.remove")));
-  const at = (/** @type {number[]} */ point) => point.map(Math.round).join(", ");
+  const row = (/** @type {string} */ text, /** @type {Partial<typeof draft.value>} */ without) => element("li", {}, element("span", {}, text), element("button.quiet", { type: "button", "aria-label": say("remeasure.remove_one", { what: text }), onclick: () => draft.set({ ...draft.value, ...without }) }, say("remeasure.remove")));
+  const place = (/** @type {number[]} */ point) => point.map(Math.round).join(", ");
   return [
-    ...(animal_at ? [row(say("remeasure.mark.animal", { at: at(animal_at.at_px), frame: String(animal_at.frame) }), { animal_at: null })] : []),
-    ...(head ? [row(say("remeasure.mark.head", { at: at(head.point), frame: String(head.frame) }), { head: null })] : []),
-    ...ignore.map((/** @type {any} */ one, /** @type {number} */ k) => row(say("remeasure.mark.ignore", { size: `${one.box_px[2]} × ${one.box_px[3]}` }), { ignore: ignore.filter((/** @type {any} */ _, /** @type {number} */ idx) => idx !== k) })),
+    ...(animal_at ? [row(say("remeasure.mark.animal", { at: place(animal_at.at_px), frame: String(animal_at.frame) }), { animal_at: null })] : []),
+    ...(head ? [row(say("remeasure.mark.head", { at: place(head.point), frame: String(head.frame) }), { head: null })] : []),
+    ...ignore.map((one, k) => row(say("remeasure.mark.ignore", { size: `${one.box_px[2]} × ${one.box_px[3]}` }), { ignore: ignore.filter((_, idx) => idx !== k) })),
     ...(camera && animal ? [row(say("remeasure.mark.size", { cm: count(100 * animal.length_m) }), { camera: null, animal: null })] : []),
   ];
 }

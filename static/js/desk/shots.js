@@ -10,7 +10,9 @@ const [WIDE, SHAPE, AROUND] = [480, 4 / 3, 1.6];
 
 /** @typedef {{frame: number, label: string, box_px?: number[], hasMarks?: boolean, around_px?: number[]}} Shot box_px is drawn; around_px: a box whose surroundings are shown, else the whole frame is */
 
-/** @param {import("./instrument.js").Instrument} desk */
+/** @typedef {(shot: Shot) => HTMLElement} Shoot returns a picture that fills itself */
+
+/** @param {import("./instrument.js").Instrument} desk @returns {Shoot} */
 export function createShots(desk) {
   const { library, life } = desk;
   const [width, height] = library.image_size_px;
@@ -42,7 +44,7 @@ export function createShots(desk) {
     for (const { target, isIntersecting } of entries) {
       if (!isIntersecting) continue;
       observer.unobserve(target);
-      wanted.push(/** @type {any} */ ({ shot: shots.get(target), canvas: target }));
+      wanted.push({ shot: /** @type {Shot} */ (shots.get(target)), canvas: /** @type {HTMLCanvasElement} */ (target) });
       if (isBroken) void fail();
       else if (!film) open();
       else if (wanted.length === 1 && film.readyState >= 2) seek();
@@ -81,7 +83,6 @@ export function createShots(desk) {
     return [within(x + w / 2 - wide / 2, width - wide), within(y + h / 2 - tall / 2, height - tall), wide, tall];
   }
 
-  /** Returns a picture that fills itself. @param {Shot} shot */
   return (shot) => {
     const [, , w, h] = viewOf(shot);
     const canvas = element("canvas.shot", { width: WIDE, height: Math.round((WIDE * h) / w), role: "img", "aria-label": shot.label });

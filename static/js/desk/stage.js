@@ -8,6 +8,7 @@ import { drawMarks } from "./marks.js";
 import { drawPath, nearestFrame } from "./path.js";
 
 /** @typedef {"film" | "background" | "sprite" | "difference"} Look */
+/** @template T @typedef {import("../app/store.js").Signal<T>} Signal */
 
 /**
  * @param {import("./instrument.js").Instrument} desk
@@ -42,7 +43,7 @@ export function createStage(desk, { player, pictures }) {
     return undefined;
   }
 
-  /** Draws how much the film differs from the background, four times as strong: what the threshold judges. */
+  /** Draws how much the film differs from the background, four times as strong: what the threshold judges. @param {CanvasRenderingContext2D} context @param {number} w @param {number} h */
   function drawDifference(context, w, h) {
     context.fillStyle = "#000";
     context.fillRect(0, 0, w, h);
@@ -57,7 +58,10 @@ export function createStage(desk, { player, pictures }) {
     context.restore();
   }
 
-  /** Draws only the animal, large and in the middle, so that a jump shows its seam. */
+  /**
+   * Draws only the animal, large and in the middle, so that a jump shows its seam.
+   * @param {CanvasRenderingContext2D} context @param {number} k @param {Omit<import("./canvas.js").Paper, "context">} paper
+   */
   function drawAnimal(context, k, { width, height, colors }) {
     const zoom = 0.7 * pictures.zoomFor(Math.min(width, height));
     const at = columns.value.centroid_px.subarray(2 * k, 2 * k + 2);
@@ -102,16 +106,19 @@ export function createStage(desk, { player, pictures }) {
   return { node, controls: controlsOf({ look, showsMarks, pictures, player, life }), look };
 }
 
-/** Returns the choice of what the stage shows. */
+/**
+ * Returns the choice of what the stage shows.
+ * @param {{look: Signal<Look>, showsMarks: Signal<boolean>, pictures: import("./pictures.js").Pictures, player: import("./player.js").Player, life: AbortSignal}} parts
+ */
 function controlsOf({ look, showsMarks, pictures, player, life }) {
-  const radios = ["film", "background", "sprite", "difference"].map((name) => {
+  const radios = /** @type {Look[]} */ (["film", "background", "sprite", "difference"]).map((name) => {
     const input = element("input", { type: "radio", name: "desk-look", value: name, checked: name === look.value, onchange: () => look.set(name) });
     return { name, input, label: element("label.choice", {}, input, element("span", {}, say(`desk.look.${name}`))) };
   });
-  look.watch((/** @type {string} */ now) => { for (const { name, input } of radios) input.checked = name === now; }, life);
+  look.watch((now) => { for (const { name, input } of radios) input.checked = name === now; }, life);
   radios[2].label.hidden = true;
-  void pictures.loaded.then((/** @type {boolean} */ found) => { radios[2].label.hidden = !found; });
-  player.isBroken.watch((/** @type {boolean} */ broken) => { radios[0].label.hidden = radios[3].label.hidden = broken; if (broken && (look.value === "film" || look.value === "difference")) look.set("background"); }, life);
+  void pictures.loaded.then((found) => { radios[2].label.hidden = !found; });
+  player.isBroken.watch((broken) => { radios[0].label.hidden = radios[3].label.hidden = broken; if (broken && (look.value === "film" || look.value === "difference")) look.set("background"); }, life);
   const marks = element("input", { type: "checkbox", checked: showsMarks.value, onchange: () => showsMarks.set(marks.checked) });
   return element("div.stage-controls", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("desk.look")), ...radios.map(({ label }) => label)), element("label.choice", {}, marks, element("span", {}, say("desk.marks"))));
 }

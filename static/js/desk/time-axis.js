@@ -29,7 +29,8 @@ export const tickWords = (time_s, step, end_s) => (step < 1 || end_s < 60 ? seco
 export function createTimeAxis(desk, player, rows) {
   const { span, moment, life, start_s, end_s, library } = desk;
   const now = element("i.now");
-  const hover = element("div.hover", { hidden: true }, element("span"));
+  const hovered = element("span");
+  const hover = element("div.hover", { hidden: true }, hovered);
   const chosen = element("i.chosen", { hidden: true });
   const axis = element("div.axis", { tabIndex: 0, role: "slider", "aria-label": say("desk.axis"), "aria-valuemin": desk.first }, ...rows, chosen, hover, now);
   const width = () => Math.max(1, axis.clientWidth - LEFT - RIGHT);
@@ -80,7 +81,7 @@ export function createTimeAxis(desk, player, rows) {
     const time_s = timeAt(event.clientX);
     hover.hidden = event.pointerType !== "mouse";
     hover.style.translate = `${xOf(time_s)}px 0`;
-    hover.firstElementChild.textContent = say("desk.at", { time: time_s.toFixed(2), frame: String(desk.frameOf(time_s)) });
+    hovered.textContent = say("desk.at", { time: time_s.toFixed(2), frame: String(desk.frameOf(time_s)) });
     hover.classList.toggle("is-late", time_s > (span.value[0] + span.value[1]) / 2);
     if (!isDown) return;
     if (!drag) return scrub(event);
@@ -120,7 +121,7 @@ export function createTimeAxis(desk, player, rows) {
   return { node: axis, buttons: element("p.actions", {}, closer, farther, whole), zoomIn, zoomOut };
 }
 
-/** Returns a span moved by a time and kept within the measured part. */
+/** Returns a span moved by a time and kept within the measured part. @param {number} from @param {number} to @param {number} by @param {{start_s: number, end_s: number}} part */
 function shifted(from, to, by, { start_s, end_s }) {
   const move = Math.min(end_s - to, Math.max(start_s - from, by));
   return [from + move, to + move];

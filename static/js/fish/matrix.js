@@ -28,4 +28,4 @@ export function rigid(turn, move) {
 }
 
 /** Returns a point moved by a matrix. @param {Matrix} m @param {ArrayLike<number>} point */
-export const moved = (m, [x, y, z]) => [0, 1, 2].map((row) => m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row]);
+export const moved = (m, { 0: x, 1: y, 2: z }) => [0, 1, 2].map((row) => m[row] * x + m[4 + row] * y + m[8 + row] * z + m[12 + row]);

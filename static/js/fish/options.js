@@ -14,7 +14,7 @@ import { changedFrom, PAPERS, shownAs } from "./settings.js";
 const ORDER = ["palette", "swim", "bank_rad", "smooth_s", "bridge_s", "length_m", "height_m"];
 
 /**
- * @param {{library: any, params: any, life: AbortSignal, onMade: (id: string) => void}} options params: of the fish that is shown, null = none
+ * @param {{library: Api.Library, params: any, life: AbortSignal, onMade: (id: string) => void}} options params: of the fish that is shown, null = none
  */
 export async function optionsBox({ library, params, life, onMade }) {
   const fields = new Map([...await loadFields("Fish")].map(([name, field]) => [name, shownAs(field, library)]));

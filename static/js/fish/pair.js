@@ -13,7 +13,7 @@ import { postureAt, boundsOf } from "./posture.js";
 import { createSpace, directionText } from "./space.js";
 
 /**
- * @param {{library: any, id: string, fish: import("./glb.js").VirtualFish | null, startFrame: number | null, life: AbortSignal,
+ * @param {{library: Api.Library, id: string, fish: import("./glb.js").VirtualFish | null, startFrame: number | null, life: AbortSignal,
  *   onRest: (frame: number | null) => void}} options id: of the virtual fish; fish: null if its model cannot be drawn;
  *   startFrame: null plays at once; onRest hears the frame at which it rests, null while it plays
  */

@@ -13,8 +13,9 @@ const KEPT_MS = 60_000;
 
 /** Returns the virtual fish of a library, newest first. @param {string} libraryId @param {AbortSignal} life */
 export async function fishOf(libraryId, life) {
+  /** @type {Api.Fish[]} */
   const found = [];
-  let address = /** @type {string | null} */ (`/v1/fish?library_id=${encodeURIComponent(libraryId)}&limit=200`);
+  let address = /** @type {Api.Next<"/v1/fish">} */ (`/v1/fish?library_id=${encodeURIComponent(libraryId)}&limit=200`);
   while (address) {
     const { items, next } = await list(address, life);
     found.push(...items.filter((one) => !deleted.value.has(one.id)));
@@ -44,7 +45,7 @@ const fishName = ({ params }) => [choiceOf("palette", params.palette ?? ""), par
 
 /**
  * Returns the table of the fish of a film with their downloads.
- * @param {any[]} all @param {{library: any, shown: string, life: AbortSignal, onDelete: (id: string) => void}} options
+ * @param {any[]} all @param {{library: Api.Library, shown: string, life: AbortSignal, onDelete: (id: string) => void}} options
  */
 export function versionTable(all, { library, shown, life, onDelete }) {
   const film = filmName(library);

@@ -14,7 +14,7 @@
 /** @param {import("./plan.js").Plan} plan @param {import("./atlas.js").Atlas} atlas @returns {Source} */
 export function planSource(plan, atlas) {
   const { nFrames, nIndividuals, fps } = plan;
-  const asked = plan.head.params?.frames;
+  const asked = plan.head.params?.frames ?? nFrames;
   return {
     fps, nFrames, span: asked > nFrames ? asked : nFrames,
     at: (t) => farToNear(Array.from({ length: nIndividuals }, (_, i) => {
@@ -26,7 +26,7 @@ export function planSource(plan, atlas) {
 
 /**
  * Returns one individual; null if the atlas lacks its sprite.
- * @param {any} atlas @param {{x: number, y: number, depth: number}} place @param {Look} look
+ * @param {import("./atlas.js").Atlas} atlas @param {{x: number, y: number, depth: number}} place @param {Look} look
  * @param {Look & {weight: number} | null} fade @returns {Appearance | null}
  */
 export function appearance(atlas, { x, y, depth }, look, fade) {
@@ -43,5 +43,5 @@ export function appearance(atlas, { x, y, depth }, look, fade) {
  */
 export const farToNear = (all) => all.flatMap((one) => one ?? []).sort((a, b) => b.depth - a.depth);
 
-/** Returns the share of its color that an animal keeps in the haze. */
+/** Returns the share of its color that an animal keeps in the haze. @param {{perBl: number, lengthPx: number}} haze @param {number} depth */
 export const keptColor = ({ perBl, lengthPx }, depth) => (1 - perBl) ** (Math.max(0, depth) / lengthPx);

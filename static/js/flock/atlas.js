@@ -16,8 +16,9 @@ import { request } from "../app/api.js";
  * @returns {Promise<Atlas>}
  */
 export async function loadAtlas(base, { small = false, signal } = {}) {
+  /** @type {Api.AtlasFile} */
   const table = await (await request("GET", `${base}atlas.json`, { signal })).json();
-  const sheet = table.sheets?.at(small ? -1 : 0);
+  const sheet = /** @type {Api.AtlasSheet} */ (table.sheets?.at(small ? -1 : 0));
   const spriteOf = lookup(table, sheet);
   const loads = await Promise.allSettled(sheet.pages.map(async ({ file }) => {
     const blob = await (await request("GET", base + encodeURIComponent(file), { signal })).blob();
@@ -34,12 +35,13 @@ export async function loadAtlas(base, { small = false, signal } = {}) {
   return { scale: sheet.scale, pages, spriteOf, close };
 }
 
-/** Returns the function that finds sprites; null for a frame that the atlas lacks. */
+/** Returns the function that finds sprites; null for a frame that the atlas lacks. @param {Api.AtlasFile} table @param {Api.AtlasSheet} sheet */
 export function lookup(table, sheet) {
   if (table.schema !== "flockreel/atlas@1" || !sheet?.pages?.length) throw new Error("The atlas cannot be read.");
+  /** @type {Map<number, Sprite>} */
   const sprites = new Map();
   for (const [k, frame] of table.frame.entries()) {
-    const [page, x, y, w, h] = ["page", "x", "y", "w", "h"].map((name) => sheet[name][k]);
+    const [page, x, y, w, h] = /** @type {const} */ (["page", "x", "y", "w", "h"]).map((name) => sheet[name][k]);
     const [width, height] = sheet.pages[page]?.size_px ?? [0, 0];
     if (!(x >= 0 && y >= 0 && w > 0 && h > 0 && x + w <= width && y + h <= height)) throw new Error(`The atlas cannot be read: frame ${frame} is not on its page.`);
     const [cx, cy] = table.center_px[k];

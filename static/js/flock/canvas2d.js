@@ -22,12 +22,15 @@ export function canvasDrawer(canvas, scene) {
     }
   }
 
-  /** Draws (1 - weight) * main + weight * second, hazed, and lays the sum over the canvas. */
+  /**
+   * Draws (1 - weight) * main + weight * second, hazed, and lays the sum over the canvas.
+   * @param {import("./appearance.js").Appearance} one @param {number} kept @param {number} zoom @param {number} x @param {number} y
+   */
   function drawMixed({ main, second, weight }, kept, zoom, x, y) {
     const reach = Math.ceil(Math.max(...[main, second ?? main].map(({ sprite, scale }) => scale * Math.hypot(sprite.w, sprite.h))) * (zoom / scene.atlas.scale)) + 1;
     const [side, left, top] = [2 * reach, Math.floor(x) - reach, Math.floor(y) - reach];
     if (spare.width < side) spare.width = spare.height = side;
-    const begin = (operation, alpha) => {
+    const begin = (/** @type {GlobalCompositeOperation} */ operation, /** @type {number} */ alpha) => {
       mixing.setTransform(1, 0, 0, 1, 0, 0);
       mixing.globalCompositeOperation = operation;
       mixing.globalAlpha = alpha;
@@ -44,7 +47,10 @@ export function canvasDrawer(canvas, scene) {
     context.drawImage(spare, 0, 0, side, side, left, top, side, side);
   }
 
-  /** Draws one sprite with its centroid at x, y of a canvas. */
+  /**
+   * Draws one sprite with its centroid at x, y of a canvas.
+   * @param {CanvasRenderingContext2D} on @param {import("./appearance.js").Shown} shown @param {number} zoom @param {number} x @param {number} y
+   */
   function drawSprite(on, { sprite, rotation, scale, mirrored }, zoom, x, y) {
     const size = (scale * zoom) / scene.atlas.scale;
     const [cos, sin, sign] = [Math.cos(rotation) * size, Math.sin(rotation) * size, mirrored ? -1 : 1];
@@ -55,7 +61,7 @@ export function canvasDrawer(canvas, scene) {
   return { setScene: (next) => { scene = next; }, draw, dispose() {} };
 }
 
-/** @param {any} context @param {import("./drawer.js").Background} background @param {HTMLCanvasElement} canvas */
+/** @param {CanvasRenderingContext2D} context @param {import("./drawer.js").Background} background @param {HTMLCanvasElement} canvas */
 function drawBackground(context, { picture, color }, { width, height }) {
   context.setTransform(1, 0, 0, 1, 0, 0);
   context.globalAlpha = 1;
@@ -67,4 +73,5 @@ function drawBackground(context, { picture, color }, { width, height }) {
   for (let y = 0; y < height; y += 10) for (let x = y % 20; x < width; x += 20) context.fillRect(x, y, 10, 10);
 }
 
-const rgb = (color) => `rgb(${color.map((/** @type {number} */ share) => Math.round(255 * share)).join(" ")})`;
+/** @param {number[]} color */
+const rgb = (color) => `rgb(${color.map((share) => Math.round(255 * share)).join(" ")})`;

@@ -32,7 +32,7 @@ export function factsOf(plan, frame) {
   return { n: plan.nIndividuals, heading, isResting: nResting >= most, nGroups: groups(points, GROUP_BL * plan.lengthPx) };
 }
 
-/** Returns the number of groups of points that links up to `reach` connect. */
+/** Returns the number of groups of points that links up to `reach` connect. @param {number[][]} points @param {number} reach */
 function groups(points, reach) {
   const left = new Set(points);
   let n = 0;

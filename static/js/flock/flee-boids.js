@@ -14,12 +14,12 @@ const DRIFT = 0.8;
 /** Share of the vertical in side view, where few animals are filmed swimming steeply. */
 const STEEP = 0.5;
 
-/** @typedef {{x: number, y: number, depth: number, heading: number, speed: number, fear: number, phase: number}} Boid phase of its wandering, rad */
+/** @typedef {{x: number, y: number, depth: number, heading: number, speed: number, fear: number, phase: number}} Boid phase of its wandering, rad
+ * @typedef {{width: number, height: number, speed: number, isSide: boolean}} Tank sides in BL, usual speed in BL/s */
 
 /**
  * Moves all boids in place.
- * @param {Boid[]} boids @param {{width: number, height: number, speed: number, isSide: boolean}} tank sides in
- *   BL, usual speed in BL/s @param {number} dt s @param {number[] | null} pointer BL
+ * @param {Boid[]} boids @param {Tank} tank @param {number} dt s @param {number[] | null} pointer BL
  */
 export function stepBoids(boids, tank, dt, pointer) {
   // In a full tank they come closer.
@@ -39,7 +39,10 @@ export function stepBoids(boids, tank, dt, pointer) {
   }
 }
 
-/** Returns the direction in which a boid wants to go, and the part that keeps it apart from its neighbors. */
+/**
+ * Returns the direction in which a boid wants to go, and the part that keeps it apart from its neighbors.
+ * @param {Boid} boid @param {Boid[]} boids @param {Tank & {reach: number}} tank @param {number[] | null} pointer
+ */
 function wish(boid, boids, { width, height, isSide, reach }, pointer) {
   const [along, middle, apart] = [[0, 0], [0, 0], [0, 0]];
   let [nAlong, nMiddle] = [0, 0];
@@ -58,12 +61,12 @@ function wish(boid, boids, { width, height, isSide, reach }, pointer) {
   if (length > 1) apart.forEach((value, axis) => { apart[axis] = value / length; });
   const sum = [Math.cos(boid.heading), Math.sin(boid.heading)];
   add(sum, -sum[1], sum[0], W_WANDER * Math.sin(boid.phase));
-  add(sum, ...along, W_ALONG / Math.max(1, nAlong));
-  add(sum, ...middle, W_TOGETHER / Math.max(1, nMiddle));
-  add(sum, ...apart, W_APART);
+  add(sum, along[0], along[1], W_ALONG / Math.max(1, nAlong));
+  add(sum, middle[0], middle[1], W_TOGETHER / Math.max(1, nMiddle));
+  add(sum, apart[0], apart[1], W_APART);
   if (isSide) sum[1] *= STEEP;
   const fear = fearOf(boid, pointer);
-  if (fear) add(sum, boid.x - pointer[0], boid.y - pointer[1], (W_FEAR * fear) / Math.max(0.1, Math.hypot(boid.x - pointer[0], boid.y - pointer[1])));
+  if (pointer && fear) add(sum, boid.x - pointer[0], boid.y - pointer[1], (W_FEAR * fear) / Math.max(0.1, Math.hypot(boid.x - pointer[0], boid.y - pointer[1])));
   for (const [axis, at, side] of [[0, boid.x, width], [1, boid.y, height]]) {
     const inward = push(at, side) - push(side - at, side);
     if (inward * sum[axis] < 0) sum[axis] *= 1 - Math.abs(inward); // turn along the wall
@@ -72,19 +75,21 @@ function wish(boid, boids, { width, height, isSide, reach }, pointer) {
   return { sum, apart };
 }
 
-/** Returns how much a boid fears the pointer: 1 at half the reach or nearer, 0 beyond it. */
+/** Returns how much a boid fears the pointer: 1 at half the reach or nearer, 0 beyond it. @param {Boid} boid @param {number[] | null} pointer */
 function fearOf({ x, y }, pointer) {
   if (!pointer) return 0;
   return Math.max(0, Math.min(1, 2 - (2 * Math.hypot(x - pointer[0], y - pointer[1])) / FEAR));
 }
 
+/** @param {number[]} sum @param {number} x @param {number} y @param {number} weight */
 function add(sum, x, y, weight) {
   sum[0] += weight * x;
   sum[1] += weight * y;
 }
 
+/** @param {number} distance @param {number} side */
 const push = (distance, side) => Math.max(0, Math.min(1, 1 - (distance - 0.5) / Math.min(WALL, side / 6)));
-/** Keeps a centroid half a body length inside, if the picture has room for that. */
+/** Keeps a centroid half a body length inside, if the picture has room for that. @param {number} at @param {number} side */
 const within = (at, side) => Math.max(Math.min(0.5, side / 2), Math.min(side - Math.min(0.5, side / 2), at));
 
 /** Returns an angle between -pi and pi. @param {number} angle */

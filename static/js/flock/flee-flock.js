@@ -12,6 +12,8 @@ export const N_ROW = 12;
  * @typedef {{x: number, y: number, depth: number, heading: number, scale: number, frame: number, mirrored: boolean}} Start
  * @typedef {Parameters<typeof createChooser>[0] & {starts: Start[], sizePx: number[], lengthPx: number, fps: number,
  *   speed: number, mostTurn: number}} FleeStart positions in pixels; usual speed, BL/s; largest rotation in side view
+ * @typedef {{frame: number, mirrored: boolean, rotation: number, age: number}} Former the look that fades out, and the frames since
+ * @typedef {{state: import("./flee-frames.js").State, rotation: number, former: Former | null}} Look
  */
 
 /** @param {FleeStart} start */
@@ -20,14 +22,16 @@ export function createFlee(start) {
   const chooser = createChooser(start);
   const tank = { width: sizePx[0] / lengthPx, height: sizePx[1] / lengthPx, speed, isSide };
   const boids = starts.map(({ x, y, depth, heading }, k) => ({ x: x / lengthPx, y: y / lengthPx, depth: depth / lengthPx, heading, speed, fear: 0, phase: 2.4 * k }));
-  const looks = starts.map(({ frame, mirrored, heading }) => ({ state: { frame, mirrored }, rotation: wanted({ frame, mirrored }, heading), former: /** @type {any} */ (null) }));
+  /** @type {Look[]} */
+  const looks = starts.map(({ frame, mirrored, heading }) => ({ state: { frame, mirrored }, rotation: wanted({ frame, mirrored }, heading), former: null }));
 
-  /** Returns the rotation that shows a frame at a heading: in side view within a limit. */
+  /** Returns the rotation that shows a frame at a heading: in side view within a limit. @param {import("./flee-frames.js").State} state @param {number} heading */
   function wanted(state, heading) {
     const gap = wrap(heading - chooser.headingOf(state));
     return isSide ? Math.max(-mostTurn, Math.min(mostTurn, gap)) : gap;
   }
 
+  /** @param {Look} look @param {number} heading */
   function show(look, heading) {
     const { isJump, ...next } = chooser.next(look.state, heading);
     const { former } = look;

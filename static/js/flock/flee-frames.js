@@ -9,7 +9,7 @@ const N_BINS = 16;
 /** Weight of each later frame, cost of a jump and of a dead end (rad), and rounds of the iteration. */
 const [LATER, JUMP, DEAD_END, ROUNDS] = [0.93, 0.4, 20, 12];
 
-/** @typedef {{frame: number, mirrored: boolean}} State */
+/** @typedef {{frame: number, mirrored: boolean}} State @typedef {{to: number, flip: boolean, cost: number}} Way */
 
 /**
  * @param {{headings: ArrayLike<number>, playable: number[], jumps: [number, number, number, boolean?][],
@@ -17,13 +17,13 @@ const [LATER, JUMP, DEAD_END, ROUNDS] = [0.93, 0.4, 20, 12];
  */
 export function createChooser({ headings, playable, jumps, canMirror, isSide }) {
   const frames = new Set(playable);
-  /** @type {Map<number, {to: number, flip: boolean, cost: number}[]>} */
+  /** @type {Map<number, Way[]>} */
   const ways = new Map(playable.map((frame) => [frame, frames.has(frame + 1) ? [{ to: frame + 1, flip: false, cost: 0 }] : []]));
   for (const [from, to, , flip = false] of jumps) if (frames.has(to) && (canMirror || !flip)) ways.get(from)?.push({ to, flip, cost: JUMP });
 
   const n = Math.max(...playable) + 1;
   const costs = Array.from({ length: N_BINS }, () => new Float32Array(n));
-  const costOf = (bin, { to, flip, cost }) => cost + costs[flip ? mirrorOf(bin) : bin][to];
+  const costOf = (/** @type {number} */ bin, /** @type {Way} */ { to, flip, cost }) => cost + costs[flip ? mirrorOf(bin) : bin][to];
   const order = [...playable].sort((a, b) => b - a);
   for (let round = 0; round < ROUNDS; round++) {
     for (let bin = 0; bin < N_BINS; bin++) {
@@ -46,6 +46,7 @@ export function createChooser({ headings, playable, jumps, canMirror, isSide }) 
      */
     next({ frame, mirrored }, heading) {
       const bin = binOf(mirrored ? Math.PI - heading : heading);
+      /** @type {Way | null} */
       let best = null;
       for (const way of ways.get(frame) ?? []) if (!best || costOf(bin, way) < costOf(bin, best)) best = way;
       best ??= { to: order.reduce((a, b) => (costs[bin][b] < costs[bin][a] ? b : a)), flip: false, cost: JUMP };
@@ -54,6 +55,6 @@ export function createChooser({ headings, playable, jumps, canMirror, isSide }) 
   };
 }
 
-const angleOf = (bin) => (2 * Math.PI * bin) / N_BINS;
-const binOf = (angle) => (((Math.round((angle * N_BINS) / (2 * Math.PI)) % N_BINS) + N_BINS) % N_BINS);
-const mirrorOf = (bin) => (N_BINS + N_BINS / 2 - bin) % N_BINS;
+const angleOf = (/** @type {number} */ bin) => (2 * Math.PI * bin) / N_BINS;
+const binOf = (/** @type {number} */ angle) => (((Math.round((angle * N_BINS) / (2 * Math.PI)) % N_BINS) + N_BINS) % N_BINS);
+const mirrorOf = (/** @type {number} */ bin) => (N_BINS + N_BINS / 2 - bin) % N_BINS;

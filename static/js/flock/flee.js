@@ -3,10 +3,12 @@
 import { appearance, farToNear } from "./appearance.js";
 import { N_ROW } from "./flee-flock.js";
 
+/** @typedef {{library: Api.LibraryFile, poses: Api.PosesFile}} Film */
+
 /**
  * Starts from one frame of a plan. Swap the player to `source`, and call `stop` after swapping back.
  * @param {import("./plan.js").Plan} plan @param {number} frame
- * @param {{atlas: import("./atlas.js").Atlas, library: any, poses: any}} film with library.json and poses.json
+ * @param {{atlas: import("./atlas.js").Atlas} & Film} film with library.json and poses.json
  * @returns {{source: import("./appearance.js").Source, point: (at: number[] | null) => void, stop: () => void}}
  *   `point` takes the pointer, pixels of the picture; null if it is gone
  */
@@ -37,7 +39,7 @@ export function startFlee(plan, frame, { atlas, library, poses }) {
   };
 }
 
-/** Returns what the worker needs to know. @param {import("./plan.js").Plan} plan @param {number} frame @param {{library: any, poses: any}} film */
+/** Returns what the worker needs to know. @param {import("./plan.js").Plan} plan @param {number} frame @param {Film} film */
 export function fleeStart(plan, frame, { library, poses }) {
   const isSide = poses.view !== "top";
   const { params } = plan.head;
@@ -54,6 +56,7 @@ export function fleeStart(plan, frame, { library, poses }) {
   };
 }
 
+/** @param {Float32Array} rows @param {import("./atlas.js").Atlas} atlas */
 function appearancesOf(rows, atlas) {
   const all = [];
   for (let at = 0; at < rows.length; at += N_ROW) {

@@ -3,7 +3,8 @@
 import { keptColor } from "./appearance.js";
 import { KINDS, programs } from "./gl-program.js";
 
-/** @typedef {import("./drawer.js").Scene} Scene @typedef {import("./drawer.js").Layer} Layer */
+/** @typedef {import("./drawer.js").Scene} Scene @typedef {import("./drawer.js").Layer} Layer @typedef {import("./appearance.js").Shown} Shown */
+/** @typedef {ReturnType<typeof import("./gl-program.js").link>} Program @typedef {{background: Program, single: Program, fading: Program}} Programs */
 
 /** Numbers of an instance: see the inputs of the vertex shader. */
 const N_FLOATS = 24;
@@ -78,9 +79,9 @@ export function glDrawer(canvas, scene) {
 /** @param {import("./appearance.js").Appearance} one @param {Scene} scene */
 function instanceOf({ x, y, depth, main, second, weight }, { atlas, haze }) {
   const [a, b] = [main, second ?? main];
-  const look = ({ rotation, scale, mirrored, sprite }) => [rotation, scale / atlas.scale, mirrored ? -1 : 1, sprite.page];
-  const box = ({ sprite }) => [sprite.x, sprite.y, sprite.w, sprite.h];
-  const center = ({ sprite }) => [sprite.cx, sprite.cy];
+  const look = (/** @type {Shown} */ { rotation, scale, mirrored, sprite }) => [rotation, scale / atlas.scale, mirrored ? -1 : 1, sprite.page];
+  const box = (/** @type {Shown} */ { sprite }) => [sprite.x, sprite.y, sprite.w, sprite.h];
+  const center = (/** @type {Shown} */ { sprite }) => [sprite.cx, sprite.cy];
   return [x, y, weight, keptColor(haze, depth), ...look(a), ...look(b), ...box(a), ...box(b), ...center(a), ...center(b)];
 }
 
@@ -112,13 +113,13 @@ function build(gl, scene) {
     for (const one of [plate, sheet]) gl.deleteTexture(one);
     gl.deleteBuffer(buffer);
   };
-  const withOpacity = (kind) => ({ ...kind, opacity: kind.at("opacity") });
+  const withOpacity = (/** @type {Program} */ kind) => ({ ...kind, opacity: kind.at("opacity") });
   const made = { background, single: withOpacity(single), fading: withOpacity(fading), free };
   prepare(gl, made, scene);
   return made;
 }
 
-/** Sets what may differ between two scenes of one atlas. @param {WebGL2RenderingContext} gl @param {any} made @param {Scene} scene @param {Scene} [former] */
+/** Sets what may differ between two scenes of one atlas. @param {WebGL2RenderingContext} gl @param {Programs} made @param {Scene} scene @param {Scene} [former] */
 function prepare(gl, { background, single, fading }, { background: { picture, color }, sizePx, haze }, former) {
   gl.useProgram(background.program);
   gl.uniform1i(background.at("kind"), picture ? KINDS.picture : color ? KINDS.color : KINDS.checkers);

@@ -16,8 +16,10 @@ const MOST_PX = 16384;
  * @typedef {Look & {x: number, y: number, depth: number, state: number}} Cell x, y, depth in pixels of the
  *   picture; state 0 rest, 1 slow, 2 go, 3 dart
  * @typedef {Look & {weight: number}} Fade the second sprite around a jump and its share, 0 to 1
- * @typedef {{head: any, nFrames: number, nIndividuals: number, fps: number, sizePx: number[], lengthPx: number,
- *   cell: (i: number, t: number) => Cell, fadeAt: (i: number, t: number) => Fade | null}} Plan
+ * @typedef {Record<string, {stored: ArrayLike<number>, scale: number}>} Columns by name
+ * @typedef {{head: Api.PlanHead, nFrames: number, nIndividuals: number, fps: number, sizePx: number[], lengthPx: number,
+ *   cell: (i: number, t: number) => Cell, fadeAt: (i: number, t: number) => Fade | null,
+ *   isFirst?: boolean, isPart?: boolean}} Plan isFirst: only the beginning is planned so far; isPart: the rest is never planned
  */
 
 /** Values are scaled when they are read. @param {ArrayBuffer} buffer @returns {Plan} */
@@ -35,8 +37,8 @@ export function decodePlan(buffer) {
   const nCells = nFrames * nIndividuals;
   for (const name of OF_CELLS) need(columns[name]?.stored.length === nCells, `column ${name} must have ${nCells} values`);
   const fades = placeFades(list(head.fades, "fades"), columns, nFrames, nIndividuals);
-  const value = (name, k) => columns[name].stored[k] * columns[name].scale;
-  const look = (of, k) => ({ sourceFrame: value(`${of}source_frame`, k), rotation: value(`${of}rotation`, k), scale: value(`${of}scale`, k) });
+  const value = (/** @type {string} */ name, /** @type {number} */ k) => columns[name].stored[k] * columns[name].scale;
+  const look = (/** @type {"" | "fade_"} */ of, /** @type {number} */ k) => ({ sourceFrame: value(`${of}source_frame`, k), rotation: value(`${of}rotation`, k), scale: value(`${of}scale`, k) });
   return {
     head, nFrames, nIndividuals, sizePx, fps: positive(head.fps, "fps", 1000), lengthPx: positive(head.length_px, "length_px", MOST_PX),
     cell(i, t) {
@@ -51,6 +53,7 @@ export function decodePlan(buffer) {
   };
 }
 
+/** @param {ArrayBuffer} buffer */
 function readHead(buffer) {
   need(buffer.byteLength >= LEAD, "the file is truncated");
   const view = new DataView(buffer);
@@ -68,13 +71,17 @@ function readHead(buffer) {
   return { head, start: LEAD + nBytes };
 }
 
-/** Returns the columns by name, as views of the buffer. */
+/**
+ * Returns the columns by name, as views of the buffer.
+ * @param {ArrayBuffer} buffer @param {number} start @param {Api.PlanHead} head @returns {Columns}
+ */
 function readColumns(buffer, start, head) {
+  /** @type {Columns} */
   const columns = Object.create(null);
   for (const column of list(head.columns, "columns")) {
     const { name, type, scale, n, at } = column ?? {};
     need(typeof name === "string" && !columns[name] && Object.hasOwn(ARRAYS, type), "a column has an unknown type or comes twice");
-    const kind = ARRAYS[type];
+    const kind = ARRAYS[/** @type {keyof typeof ARRAYS} */ (type)];
     whole(n, `n of ${name}`, 0);
     whole(at, `at of ${name}`, 0);
     need(at % 4 === 0 && at + n * kind.BYTES_PER_ELEMENT <= buffer.byteLength - start, `the file is truncated in column ${name}`);
@@ -83,7 +90,10 @@ function readColumns(buffer, start, head) {
   return columns;
 }
 
-/** Returns for every cell its place in the columns of fades, plus 1; negative if mirrored, 0 without a fade. */
+/**
+ * Returns for every cell its place in the columns of fades, plus 1; negative if mirrored, 0 without a fade.
+ * @param {Api.PlanHead["fades"]} fades @param {Columns} columns @param {number} nFrames @param {number} nIndividuals
+ */
 function placeFades(fades, columns, nFrames, nIndividuals) {
   const total = columns[OF_FADES[0]]?.stored.length;
   for (const name of OF_FADES) need(columns[name]?.stored.length === total, `column ${name} is missing or too short`);
@@ -99,20 +109,24 @@ function placeFades(fades, columns, nFrames, nIndividuals) {
   return places;
 }
 
+/** @param {boolean} isTrue @param {string} sentence @returns {asserts isTrue} */
 function need(isTrue, sentence) {
   if (!isTrue) throw new Error(`This plan cannot be read: ${sentence}.`);
 }
 
+/** @param {number} value @param {string} name @param {number} least */
 function whole(value, name, least, most = Number.MAX_SAFE_INTEGER) {
   need(Number.isSafeInteger(value) && value >= least && value <= most, `${name} must be a whole number from ${least} to ${most}`);
   return value;
 }
 
+/** @param {number} value @param {string} name @param {number} most */
 function positive(value, name, most) {
   need(Number.isFinite(value) && value > 0 && value <= most, `${name} must be a number above 0`);
   return value;
 }
 
+/** @template T @param {T[]} value @param {string} name */
 function list(value, name, n = value?.length) {
   need(Array.isArray(value) && value.length === n, `${name} must be a list of ${n}`);
   return value;

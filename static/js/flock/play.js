@@ -45,6 +45,7 @@ export function createPlayer(drawer, source, { onFrame = () => {}, onState = () 
     ask();
   }
 
+  /** @param {number} now ms */
   function draw(now) {
     const fresh = frame() !== shown;
     shown = frame();

@@ -53,7 +53,7 @@ function tellInTray(name, problem) {
 export function fileButton(label, { camera = false } = {}) {
   const input = element("input.file", { type: "file", accept: camera ? "video/*" : ACCEPT, multiple: !camera, "aria-label": label });
   if (camera) input.setAttribute("capture", "environment");
-  input.addEventListener("change", () => { measureAll([...input.files]); input.value = ""; });
+  input.addEventListener("change", () => { measureAll([...input.files ?? []]); input.value = ""; });
   return element("label.button.file-button", {}, label, input);
 }
 
@@ -89,7 +89,7 @@ const isMeasured = async (footageId) => (await list(`/v1/libraries?footage_id=${
 
 /**
  * Starts an analysis and shows its film. The tray tells why if it cannot start.
- * @param {string} footageId @param {any} params @param {{show: boolean}} options
+ * @param {string} footageId @param {Api.AnalysisChanges} params @param {{show: boolean}} options
  */
 export async function measure(footageId, params, { show }) {
   try {

@@ -16,7 +16,7 @@ export const isHere = () => /^(localhost|127\.|\[::1\])/.test(location.hostname)
 
 /**
  * Makes a link to the page with the film of a flock.
- * @param {any} flock @param {number} expires_s @param {AbortSignal} [life] @returns {Promise<{url: string, expires_at: string}>}
+ * @param {Api.Flock} flock @param {number} expires_s @param {AbortSignal} [life] @returns {Promise<{url: string, expires_at: string}>}
  */
 export async function linkTo(flock, expires_s, life) {
   const files = sharedFilesOf(flock);

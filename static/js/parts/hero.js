@@ -19,7 +19,7 @@ export function setBack(stage, src) {
 /**
  * Shows a flock and its film on the stage until `life` ends.
  * @param {HTMLElement} stage
- * @param {{library: any, planning: Promise<any>, life: AbortSignal, links: Node[]}} options
+ * @param {{library: Api.Library, planning: Promise<import("../flock/plan.js").Plan>, life: AbortSignal, links: Node[]}} options
  */
 export async function showFlock(stage, { library, planning, life, links }) {
   const base = `/v1/libraries/${library.id}`;

@@ -14,7 +14,7 @@ const PLAN = "application/vnd.flockreel.plan";
 /** Time between two updates of the sentence for screen readers, ms. */
 const DESCRIBE_MS = 5000;
 
-/** Asks the service for a plan. @param {string} libraryId @param {any} params @param {AbortSignal} [signal] */
+/** Asks the service for a plan. @param {string} libraryId @param {Api.FlockChanges} params @param {AbortSignal} [signal] */
 export async function preview(libraryId, params, signal) {
   const response = await request("POST", "/v1/flocks/preview", { body: { library_id: libraryId, ...params }, accept: PLAN, signal });
   return decodePlan(await response.arrayBuffer());
@@ -26,13 +26,13 @@ export async function planOf(flockId, signal) {
 }
 
 /**
- * @typedef {{node: HTMLElement, canvas: HTMLCanvasElement, player: any, atlas: any, readonly plan: any,
- *   show: (plan: any) => void, showSource: (source: any) => void}} Living `show` swaps to another plan
+ * @typedef {{node: HTMLElement, canvas: HTMLCanvasElement, player: any, atlas: any, readonly plan: import("../flock/plan.js").Plan,
+ *   show: (plan: import("../flock/plan.js").Plan) => void, showSource: (source: any) => void}} Living `show` swaps to another plan
  */
 
 /**
  * Shows a flock in a canvas until `life` ends.
- * @param {{libraryId: string, plan: any, life: AbortSignal, small?: boolean, pictures?: Promise<[any, ImageBitmap]>, onFrame?: (frame: number) => void, onState?: (isPlaying: boolean) => void}} options
+ * @param {{libraryId: string, plan: import("../flock/plan.js").Plan, life: AbortSignal, small?: boolean, pictures?: Promise<[any, ImageBitmap]>, onFrame?: (frame: number) => void, onState?: (isPlaying: boolean) => void}} options
  *   `small` loads the small sheet of the atlas, for little canvases and phones; `pictures` are under way already
  * @returns {Promise<Living>}
  */
@@ -83,7 +83,7 @@ async function loadPicture(address, signal) {
   return createImageBitmap(await (await request("GET", address, { signal })).blob());
 }
 
-/** Returns what a frame shows as a sentence. @param {any} plan @param {number} frame */
+/** Returns what a frame shows as a sentence. @param {import("../flock/plan.js").Plan} plan @param {number} frame */
 async function sentence(plan, frame) {
   const { factsOf } = await import("../flock/describe.js");
   const { n, heading, isResting, nGroups } = factsOf(plan, frame);

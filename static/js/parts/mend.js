@@ -3,6 +3,7 @@
 import { say } from "../app/words.js";
 
 /** Settings that help after a refusal, by its code. The key of the words is `mend.` and the name. */
+/** @type {Record<string, {name: string, params: Api.AnalysisChanges}[]>} */
 const MENDS = {
   several_animals: [{ name: "follow_largest", params: { follow: "largest" } }],
   nothing_moves: [{ name: "lower_threshold", params: { threshold: 10 } }],
@@ -16,11 +17,11 @@ const MENDS = {
 };
 
 /**
- * Returns the buttons for a problem. @param {any} problem @param {(params: any) => void} measure
+ * Returns the buttons for a problem. @param {any} problem @param {(params: Api.AnalysisChanges) => void} measure
  * @param {number} [length_s] length of the film: a part as long as the film mends nothing
  * @returns {import("./problem.js").Mend[]}
  */
 export function mendsOf(problem, measure, length_s = Infinity) {
-  const mends = /** @type {Record<string, any[]>} */ (MENDS)[problem.code] ?? [];
-  return mends.filter(({ params }) => !(params.to_s >= length_s)).map(({ name, params }) => ({ label: say(`mend.${name}`), act: () => measure(params) }));
+  const mends = MENDS[problem.code] ?? [];
+  return mends.filter(({ params }) => !((params.to_s ?? 0) >= length_s)).map(({ name, params }) => ({ label: say(`mend.${name}`), act: () => measure(params) }));
 }

@@ -6,7 +6,7 @@ import { say, size } from "../app/words.js";
 
 /**
  * Returns a button that pins a thing or unpins it.
- * @param {{path: string, isPinned: boolean, name: string}} thing @param {(problem: any) => void} tell
+ * @param {{path: Api.Address<"patch">, isPinned: boolean, name: string}} thing @param {(problem: any) => void} tell
  */
 export function pinButton({ path, isPinned, name }, tell) {
   const button = element("button.quiet.small", { type: "button", title: say("pin.help"), "aria-label": say("pin.of", { name }), "aria-pressed": isPinned, onclick: toggle }, say("pin"));
@@ -25,6 +25,6 @@ export function pinButton({ path, isPinned, name }, tell) {
 export async function spaceSentence(life) {
   const { used_bytes, max_bytes, keep_days } = await get("/v1/usage", life);
   if (used_bytes === 0) return "";
-  const used = max_bytes === null ? say("space.used", { used: size(used_bytes) }) : say("space.of", { used: size(used_bytes), max: size(max_bytes) });
-  return keep_days === null ? used : `${used} ${say("space.keep", { n: keep_days })}`;
+  const used = max_bytes == null ? say("space.used", { used: size(used_bytes) }) : say("space.of", { used: size(used_bytes), max: size(max_bytes) });
+  return keep_days == null ? used : `${used} ${say("space.keep", { n: keep_days })}`;
 }

@@ -1,7 +1,7 @@
 // The tray of jobs: what runs, how far it is, and buttons to cancel, open, mend or retry.
 // @ts-check
 import { byId, element } from "../app/element.js";
-import { addressOf, aheadOf, cancel, isUnderWay, jobs, resultOf, retry, uploads } from "../app/jobs.js";
+import { addressOf, aheadOf, cancel, isUnderWay, jobs, resultOf, retry, subjectIdOf, uploads } from "../app/jobs.js";
 import { subjectOf } from "../app/names.js";
 import { ago, percent, say, size, stageOf } from "../app/words.js";
 import { fileButton, measure } from "./drop.js";
@@ -21,7 +21,7 @@ export function fillTray() {
   const close = element("button.quiet", { type: "button", onclick: () => tray.hidePopover() }, say("close"));
   tray.append(element("div.tray-head", {}, element("h2", {}, say("tray.title")), close), list, element("a", { href: "/jobs" }, say("tray.all")));
   // A link inside leads away from what the tray covers.
-  tray.addEventListener("click", (/** @type {any} */ event) => { if (event.target.closest("a[href]")) tray.hidePopover(); });
+  tray.addEventListener("click", ({ target }) => { if (target instanceof Element && target.closest("a[href]")) tray.hidePopover(); });
   const draw = () => {
     const running = jobs.value.filter(isUnderWay);
     const shown = [...running, ...jobs.value.filter((job) => !isUnderWay(job)).slice(0, ENDED)];
@@ -32,21 +32,23 @@ export function fillTray() {
   uploads.watch(draw);
 }
 
+/** @template T @typedef {{key: string, draw: (of: T) => HTMLElement & {update: (of: T) => void}, of: T}} Entry */
+
 /**
  * Keeps one element per entry, updates it, and removes those of former entries. Focus and open parts stay.
- * @param {Element} list @param {{key: string, draw: (of: any) => any, of: any}[]} entries
+ * @param {Element} list @param {(Entry<Api.Job> | Entry<import("../app/upload.js").Upload>)[]} entries
  */
 export function reconcile(list, entries) {
-  const old = new Map([...list.children].map((node) => [/** @type {any} */ (node).key, node]));
-  const nodes = entries.map(({ key, draw, of }) => {
-    const node = /** @type {any} */ (old.get(key)) ?? Object.assign(draw(of), { key });
-    node.update?.(of);
+  const old = new Map([...list.children].map((node) => ["key" in node ? node.key : "", node]));
+  const nodes = /** @type {Entry<any>[]} */ (entries).map(({ key, draw, of }) => {
+    const node = /** @type {ReturnType<typeof draw> | undefined} */ (old.get(key)) ?? Object.assign(draw(of), { key });
+    node.update(of);
     return node;
   });
   if (nodes.some((node, idx) => list.children[idx] !== node) || list.childElementCount !== nodes.length) list.replaceChildren(...nodes);
 }
 
-/** Returns the card of a job. Its `update` shows a newer state. @param {any} job */
+/** Returns the card of a job. Its `update` shows a newer state. @param {Pick<Api.Job, "kind">} job */
 export function jobCard(job) {
   const name = element("strong");
   const stage = element("span.job-stage", { role: "status" });
@@ -57,7 +59,7 @@ export function jobCard(job) {
   const thumb = element("img.job-thumb", { alt: "", width: 64, height: 48, hidden: true });
   const card = element("article.job", {}, thumb, element("div.job-body", {}, element("div.job-line", {}, name, stage), bar, more, problem, actions));
   let [drawn, isNamed] = ["", true];
-  const tellSubject = async (/** @type {any} */ seen) => {
+  const tellSubject = async (/** @type {Api.Job} */ seen) => {
     // Without an answer of the service, it is asked again at the next change.
     const film = await subjectOf(seen).catch(() => ({ name: say("film.unnamed"), poster: "", isGone: false, isUnknown: true }));
     isNamed = !("isUnknown" in film);
@@ -66,7 +68,7 @@ export function jobCard(job) {
     if (film.poster) thumb.src = film.poster;
     if (drawn.startsWith(seen.state) && !isUnderWay(seen)) actions.replaceChildren(...buttonsOf(seen, film));
   };
-  card.update = (/** @type {any} */ seen) => {
+  const update = (/** @type {Api.Job} */ seen) => {
     bar.value = seen.progress ?? 0;
     bar.hidden = !isUnderWay(seen);
     stage.textContent = seen.state === "running" ? `${stageOf(seen)} · ${percent(seen.progress ?? 0)}` : stageOf(seen);
@@ -76,15 +78,15 @@ export function jobCard(job) {
     if (state === drawn) return isNamed ? undefined : void tellSubject(seen);
     drawn = state;
     card.dataset.state = seen.state;
-    const mends = seen.kind === "analysis" ? mendsOf(seen.error ?? {}, (params) => measure(seen.subject.id, params, { show: true })) : [];
+    const mends = seen.kind === "analysis" ? mendsOf(seen.error ?? {}, (params) => measure(subjectIdOf(seen), params, { show: true })) : [];
     problem.replaceChildren(...(seen.state === "failed" ? [problemBox(seen.error ?? {}, mends)] : []));
     actions.replaceChildren(...buttonsOf(seen));
     return void tellSubject(seen);
   };
-  return card;
+  return Object.assign(card, { update });
 }
 
-/** @param {any} job @param {{isGone: boolean}} [film] what the job works on, once it is known */
+/** @param {Api.Job} job @param {{isGone: boolean}} [film] what the job works on, once it is known */
 function buttonsOf(job, film) {
   if (isUnderWay(job)) {
     return [element("button.quiet", { type: "button", disabled: job.cancel_requested, onclick: once(() => cancel(job.id)) }, say("cancel"))];
@@ -92,20 +94,24 @@ function buttonsOf(job, film) {
   if (!film || film.isGone) return [];
   if (job.state === "done") return job.kind === "sample" ? [] : [element("a.button.quiet", { href: addressOf(job) }, say("job.open")), ...(job.kind === "flock" ? filmButtons(resultOf(job)) : [])];
   const again = job.retriable ? [element("button.quiet", { type: "button", onclick: once(() => retry(job.id)) }, say("job.retry"))] : [];
-  if (job.kind === "analysis") return [...(again.length ? again : [element("button.quiet", { type: "button", onclick: () => measure(job.subject.id, {}, { show: true }) }, say("job.again"))]), element("a.button.quiet", { href: `/films/${job.subject.id}` }, say("job.film"))];
-  return job.kind === "flock" ? [...again, element("a.button.quiet", { href: `/libraries/${job.subject.id}/studio` }, say("reels.studio"))] : again;
+  if (job.kind === "analysis") return [...(again.length ? again : [element("button.quiet", { type: "button", onclick: () => measure(subjectIdOf(job), {}, { show: true }) }, say("job.again"))]), element("a.button.quiet", { href: `/films/${subjectIdOf(job)}` }, say("job.film"))];
+  return job.kind === "flock" ? [...again, element("a.button.quiet", { href: `/libraries/${subjectIdOf(job)}/studio` }, say("reels.studio"))] : again;
 }
 
-/** Returns how many jobs come before a job that waits. @param {any} job */
+/** Returns how many jobs come before a job that waits. @param {Api.Job} job */
 function aheadText(job) {
   const n = job.state === "queued" ? aheadOf(job) : 0;
   return n ? say("job.ahead", { n }) : "";
 }
 
-/** Returns a handler of clicks that disables its button, unless the request fails. @param {() => Promise<any>} request */
-const once = (request) => (/** @type {any} */ event) => { event.target.disabled = true; request().catch(() => { event.target.disabled = false; }); };
+/** Returns a handler of clicks that disables its button, unless the request fails. @param {() => Promise<unknown>} request */
+const once = (request) => (/** @type {Event} */ { target }) => {
+  const button = /** @type {HTMLButtonElement} */ (target);
+  button.disabled = true;
+  request().catch(() => { button.disabled = false; });
+};
 
-/** Returns the time left as text, estimated from the progress since the job began. @param {any} job */
+/** Returns the time left as text, estimated from the progress since the job began. @param {Api.Job} job */
 function leftText(job) {
   const elapsed_s = (Date.now() - Date.parse(job.started_at ?? "")) / 1000;
   const isKnown = job.progress >= LEAST_SHARE && (job.progress >= TOLD_SHARE || elapsed_s >= TOLD_S);
@@ -115,7 +121,7 @@ function leftText(job) {
   return say("job.left", { time: left_s < 90 ? say("unit.seconds", { n: Math.round(left_s) }) : say("unit.minutes", { n: Math.round(left_s / 60) }) });
 }
 
-/** Returns the card of an upload. @param {any} upload */
+/** Returns the card of an upload. @param {import("../app/upload.js").Upload} upload */
 function uploadCard(upload) {
   const name = element("strong", {}, upload.name);
   const stage = element("span.job-stage", { role: "status" });
@@ -124,9 +130,9 @@ function uploadCard(upload) {
   const problem = element("div");
   const stop = element("button.quiet", { type: "button", onclick: () => upload.cancel() });
   const again = upload.state === "paused" && fileButton(say("home.choose"));
-  const film = upload.address && element("video.job-thumb", { src: upload.address, muted: true, preload: "metadata", "aria-hidden": "true", onerror: () => film.remove() });
+  const film = upload.address && element("video.job-thumb", { src: upload.address, muted: true, preload: "metadata", "aria-hidden": "true", onerror: () => film && film.remove() });
   const card = element("article.job", {}, film, element("div.job-body", {}, element("div.job-line", {}, name, stage), bar, more, problem, element("p.actions", {}, again, stop)));
-  card.update = (/** @type {any} */ seen) => {
+  const update = (/** @type {typeof upload} */ seen) => {
     bar.value = seen.total ? seen.sent / seen.total : 0;
     bar.hidden = seen.state !== "sending";
     stage.textContent = say(`upload.${seen.state}`);
@@ -135,5 +141,5 @@ function uploadCard(upload) {
     stop.textContent = say(seen.state === "failed" ? "dismiss" : "cancel");
     if (seen.state === "failed" && !problem.childElementCount) problem.replaceChildren(problemBox(seen.problem));
   };
-  return card;
+  return Object.assign(card, { update });
 }

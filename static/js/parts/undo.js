@@ -13,7 +13,7 @@ const UNDO_MS = 10_000;
 /** Ids of things that are deleted or about to be. Lists leave them out. @type {import("../app/store.js").Signal<Set<string>>} */
 export const deleted = signal(new Set());
 
-/** Deletions that wait, by path. @type {Map<string, number>} */
+/** Deletions that wait, by path. @type {Map<Api.Address<"delete">, number>} */
 const waiting = new Map();
 /** @type {HTMLElement | null} */
 let notes = null;
@@ -27,11 +27,11 @@ function mark(id, isDeleted) {
 
 /**
  * Deletes a thing after the time to undo. Leaving the page deletes it at once.
- * @param {{id: string, path: string, name: string}} thing @returns {{focus: () => void}} the button that undoes it
+ * @param {{id: string, path: Api.Address<"delete">, name: string}} thing @returns {{focus: () => void}} the button that undoes it
  */
 export function deleteLater({ id, path, name }) {
   if (!notes) {
-    notes = /** @type {HTMLElement} */ (element("div.undo-notes", { role: "status" }));
+    notes = element("div.undo-notes", { role: "status" });
     document.body.append(notes);
     addEventListener("pagehide", deleteWaiting);
   }

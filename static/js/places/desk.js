@@ -43,7 +43,7 @@ export async function show(root, { id, query, life }) {
     .then(({ openRemeasure }) => openRemeasure(desk, { player, results, tool, params }))
     .catch((problem) => { if (!life.aborted) showProblem(results, problem); });
   const panels = createPanels(desk, { player, pictures, shoot, tab: query.get("tab") ?? "", remeasure });
-  const showTab = (/** @type {string} */ tab) => { panels.chosen.set(tab); panels.node.scrollIntoView({ block: "nearest" }); panels.node.querySelector(`#tab-${tab}`)?.focus({ preventScroll: true }); };
+  const showTab = (/** @type {string} */ tab) => { panels.chosen.set(tab); panels.node.scrollIntoView({ block: "nearest" }); /** @type {HTMLElement | null} */ (panels.node.querySelector(`#tab-${tab}`))?.focus({ preventScroll: true }); };
   const numbers = element("div");
   const failure = element("div");
 
@@ -95,7 +95,7 @@ function followAddress(desk, tab, life) {
 /** Shows the numbers of another measurement beside these. @param {string | null} other @param {{desk: import("../desk/instrument.js").Instrument, results: HTMLElement}} parts */
 async function compareWith(other, { desk, results }) {
   if (!other) return;
-  const base = `/v1/libraries/${encodeURIComponent(other)}`;
+  const base = /** @type {const} */ (`/v1/libraries/${encodeURIComponent(other)}`);
   const [library, facts] = await Promise.all([get(base, desk.life), get(`${base}/library.json`, desk.life)]);
   desk.facts.watch((now) => {
     if (now) results.replaceChildren(element("h2", {}, say("desk.compare.title")), comparison({ library, facts }, { library: desk.library, facts: now }), element("p.actions", {}, element("a.button.quiet", { href: `/libraries/${other}` }, say("desk.compare.back"))));

@@ -20,7 +20,7 @@ import { deleteLater } from "../parts/undo.js";
 /** First flock of a film: as many as have room. */
 const FIRST = { frames: 300 };
 
-/** @typedef {{film: any, stage: HTMLElement, status: HTMLElement, life: AbortSignal}} Parts */
+/** @typedef {{film: Api.Footage, stage: HTMLElement, status: HTMLElement, life: AbortSignal}} Parts */
 
 /** @param {HTMLElement} root @param {import("../app/router.js").Visit} visit */
 export async function show(root, { id, life, state }) {
@@ -77,7 +77,7 @@ function offer({ film, status }, sentence) {
   return button;
 }
 
-/** @param {any} job @param {Parts} parts */
+/** @param {Api.Job} job @param {Parts} parts */
 async function follow(job, parts) {
   const { film, status, life } = parts;
   showFilm(parts);
@@ -90,7 +90,7 @@ async function follow(job, parts) {
   } catch (problem) {
     if (life.aborted) return;
     // A disabled button has lost its focus to the page.
-    const hadFocus = card.contains(document.activeElement) || [document.body, document.querySelector("#place h1")].includes(/** @type {any} */ (document.activeElement));
+    const hadFocus = card.contains(document.activeElement) || [document.body, document.querySelector("#place h1")].includes(/** @type {HTMLElement} */ (document.activeElement));
     if (/** @type {any} */ (problem).name === "AbortError") {
       const button = offer(parts, say("film.cancelled"));
       if (hadFocus) button.focus();

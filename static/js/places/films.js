@@ -2,7 +2,7 @@
 // @ts-check
 import { list } from "../app/api.js";
 import { element } from "../app/element.js";
-import { isUnderWay, jobs } from "../app/jobs.js";
+import { isUnderWay, jobs, subjectIdOf } from "../app/jobs.js";
 import { filmName } from "../app/names.js";
 import { setTitle } from "../app/router.js";
 import { percent, say, stageOf } from "../app/words.js";
@@ -15,7 +15,7 @@ import { deleted, deleteLater } from "../parts/undo.js";
 /** Films of a page. */
 const PAGE = 30;
 
-/** @typedef {{film: any, library: any, node: HTMLElement, state: HTMLElement}} Entry library: the newest one of the film */
+/** @typedef {{film: Api.Footage, library: Api.Library, node: HTMLElement, state: HTMLElement}} Entry library: the newest one of the film */
 
 /** @param {HTMLElement} root @param {import("../app/router.js").Visit} visit */
 export async function show(root, { life }) {
@@ -31,11 +31,11 @@ export async function show(root, { life }) {
     element("p.soft.narrow", {}, say("films.help")), space, found, trouble, empty, cards, element("p", {}, more));
   /** @type {Entry[]} */
   let all = [];
-  /** @type {string | null} */
+  /** @type {Api.Next<"/v1/footage">} */
   let next = `/v1/footage?limit=${PAGE}`;
   const tell = (/** @type {any} */ problem) => { if (!life.aborted) trouble.replaceChildren(problemBox(problem)); };
 
-  /** @param {any} film @returns {Promise<Entry>} */
+  /** @param {Api.Footage} film @returns {Promise<Entry>} */
   const entry = async (film) => {
     const [library] = (await list(`/v1/libraries?footage_id=${film.id}&limit=1`, life)).items;
     const state = element("p.film-state");
@@ -44,7 +44,7 @@ export async function show(root, { life }) {
     const pin = pinButton({ path: `/v1/footage/${film.id}`, isPinned: film.pinned, name }, tell);
     return { film, library, node: filmCard(film, { library, state: element("div.film-foot", {}, state, pin, drop) }), state };
   };
-  /** Makes the entries of films that are not shown yet. @param {any[]} films */
+  /** Makes the entries of films that are not shown yet. @param {Api.Footage[]} films */
   const entriesOf = async (films) => {
     const made = await Promise.all(films.filter((film) => !all.some((one) => one.film.id === film.id)).map(entry));
     return made.filter(({ film }) => !all.some((one) => one.film.id === film.id));
@@ -104,11 +104,11 @@ export async function show(root, { life }) {
     const fresh = every.filter((job) => job.kind !== "flock" && !known.has(stateKey(job)));
     known = new Set(every.map(stateKey));
     if (fresh.length) {
-      refresh(new Set(fresh.map((job) => job.subject?.id))).catch(() => {});
+      refresh(new Set(fresh.map(subjectIdOf))).catch(() => {});
       tellSpace();
     }
   }, life);
 }
 
-/** @param {any} job */
+/** @param {Api.Job} job */
 const stateKey = (job) => `${job.id} ${job.state === "done"}`;

@@ -48,10 +48,10 @@ export async function show(root, { id, query, life }) {
 /** @param {string} id @param {AbortSignal} life */
 const modelOf = async (id, life) => readGlb(await (await request("GET", `/v1/fish/${id}/model.glb`, { signal: life })).arrayBuffer());
 
-/** A film without a virtual fish: one button makes it. */
+/** A film without a virtual fish: one button makes it. @param {HTMLElement} root @param {{library: Api.Library, life: AbortSignal, open: (fishId: string) => void}} options */
 function showNone(root, { library, life, open }) {
   const { button, state, follow } = maker({ libraryId: library.id, settings: () => ({}), life, onMade: open, isFirst: true });
   root.append(element("section.fish-none", {}, element("img", { src: `/v1/libraries/${library.id}/poster.jpg`, alt: say("fish.left") }), element("p", {}, say("fish.none")), element("p.actions", {}, button), state));
   const running = jobs.value.find((job) => job.kind === "fish" && job.subject?.id === library.id && isUnderWay(job));
-  if (running) follow(running.id).catch((/** @type {any} */ problem) => { if (!life.aborted && problem.name !== "AbortError") state.replaceChildren(problemBox(problem)); });
+  if (running) follow(running.id).catch((problem) => { if (!life.aborted && problem.name !== "AbortError") state.replaceChildren(problemBox(problem)); });
 }

@@ -2,7 +2,7 @@
 // @ts-check
 import { list } from "../app/api.js";
 import { element, releaseVideo } from "../app/element.js";
-import { isUnderWay, jobs, ready } from "../app/jobs.js";
+import { isUnderWay, jobs, ready, subjectIdOf } from "../app/jobs.js";
 import { isCalm } from "../app/motion.js";
 import { remember, thing } from "../app/names.js";
 import { setTitle } from "../app/router.js";
@@ -48,7 +48,7 @@ export async function show(root, { life }) {
   };
   // Results of other tabs and of the sample appear by themselves.
   let n_done = -1;
-  const hear = (/** @type {any[]} */ all) => {
+  const hear = (/** @type {Api.Job[]} */ all) => {
     if (!ready.value) return;
     const running = all.filter(isUnderWay);
     if (shown === "") showWaiting(stage, running, life).catch(() => {});
@@ -61,18 +61,18 @@ export async function show(root, { life }) {
   ready.watch(() => hear(jobs.value), life);
 }
 
-/** Returns the newest thing to show: a flock, or a library without one. @param {any} flock @param {any} library */
+/** Returns the newest thing to show: a flock, or a library without one. @param {Api.Flock | undefined} flock @param {Api.Library | undefined} library */
 function newestOf(flock, library) {
   if (library && (!flock || (flock.library_id !== library.id && flock.created_at < library.created_at))) return { key: library.id, libraryId: library.id, flock: null };
   return { key: flock?.id ?? "", libraryId: flock?.library_id ?? "", flock };
 }
 
-/** Shows the first jobs of an empty service, or what to do. @param {HTMLElement} stage @param {any[]} running @param {AbortSignal} life */
+/** Shows the first jobs of an empty service, or what to do. @param {HTMLElement} stage @param {Api.Job[]} running @param {AbortSignal} life */
 async function showWaiting(stage, running, life) {
   if (!running.length) return showEmpty(stage);
   const { jobCard, reconcile } = await import("../parts/tray.js");
   if (stage.classList.contains("alive")) return undefined;
-  let cards = /** @type {any} */ (stage.querySelector(".hero-jobs"));
+  let cards = stage.querySelector(".hero-jobs");
   if (!cards) {
     const sample = running.some((job) => job.kind === "sample");
     cards = element("div.hero-jobs");
@@ -81,7 +81,7 @@ async function showWaiting(stage, running, life) {
   const chain = [...running].reverse().slice(0, 3);
   // The film under measurement plays behind, as soon as it exists.
   const measured = chain.find((job) => job.kind === "analysis");
-  if (measured?.state === "running" && !stage.querySelector(".hero-behind")) stage.prepend(filmBehind(measured.subject.id, life));
+  if (measured?.state === "running" && !stage.querySelector(".hero-behind")) stage.prepend(filmBehind(subjectIdOf(measured), life));
   reconcile(cards, chain.map((job) => ({ key: job.id, draw: jobCard, of: job })));
   return undefined;
 }
@@ -91,7 +91,7 @@ function showEmpty(stage) {
   const newest = jobs.value.find((job) => job.kind === "analysis");
   const isRefused = newest?.state === "failed" || newest?.state === "cancelled";
   stage.replaceChildren(element("div.hero-wait", {}, element("p.hero-note", { role: "status" }, say(isRefused ? "home.failed" : "home.empty")),
-    isRefused && element("p.actions", {}, element("a.button.quiet", { href: `/films/${newest.subject.id}` }, say("job.film")))));
+    isRefused && element("p.actions", {}, element("a.button.quiet", { href: `/films/${subjectIdOf(newest)}` }, say("job.film")))));
 }
 
 /** @param {string} footageId @param {AbortSignal} life */
@@ -102,7 +102,7 @@ function filmBehind(footageId, life) {
   return film;
 }
 
-/** @param {HTMLElement} stage @param {{libraryId: string, flock: any}} newest @param {AbortSignal} life */
+/** @param {HTMLElement} stage @param {{libraryId: string, flock?: Api.Flock | null}} newest @param {AbortSignal} life */
 async function enliven(stage, { libraryId, flock }, life) {
   const planning = flock ? planOf(flock.id, life) : preview(libraryId, FIRST, life);
   planning.catch(() => {});
@@ -118,13 +118,13 @@ async function enliven(stage, { libraryId, flock }, life) {
   await showFlock(stage, { library, planning, life, links });
 }
 
-/** @param {HTMLElement} recent @param {any[]} flocks @param {any[]} libraries @param {AbortSignal} life */
+/** @param {HTMLElement} recent @param {Api.Flock[]} flocks @param {Api.Library[]} libraries @param {AbortSignal} life */
 async function showRecent(recent, flocks, libraries, life) {
   const { flockCard, libraryCard } = await import("../parts/cards.js");
   const bare = libraries.filter((library) => !flocks.some((flock) => flock.library_id === library.id));
-  const all = [...flocks.map((one) => ({ one, card: flockCard })), ...bare.map((one) => ({ one, card: libraryCard }))]
-    .sort((a, b) => (a.one.created_at < b.one.created_at ? 1 : -1)).slice(0, RECENT);
-  const cards = await Promise.all(all.map(({ one, card }) => card(one)));
+  const all = [...flocks.map((one) => ({ time: one.created_at, draw: () => flockCard(one) })), ...bare.map((one) => ({ time: one.created_at, draw: () => libraryCard(one) }))]
+    .sort((a, b) => (a.time < b.time ? 1 : -1)).slice(0, RECENT);
+  const cards = await Promise.all(all.map(({ draw }) => draw()));
   if (life.aborted) return;
   recent.replaceChildren(...cards);
   /** @type {HTMLElement} */ (recent.parentElement).hidden = cards.length === 0;

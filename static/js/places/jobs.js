@@ -19,7 +19,7 @@ export function show(root, { life }) {
     const live = all.filter(isUnderWay);
     setTitle(live.length ? say("jobs.running", { n: live.length }) : say("jobs.title"));
     summary.textContent = !ready.value ? "" : live.length ? say("jobs.running", { n: live.length }) : all.length ? say("jobs.idle") : say("jobs.empty");
-    const entries = (/** @type {any[]} */ some) => some.map((job) => ({ key: job.id, draw: jobCard, of: job }));
+    const entries = (/** @type {Api.Job[]} */ some) => some.map((job) => ({ key: job.id, draw: jobCard, of: job }));
     reconcile(running, entries(live));
     reconcile(ended, entries(all.filter((job) => !isUnderWay(job))));
     before.hidden = live.length === all.length;

@@ -35,7 +35,7 @@ export async function show(root, { id, query, life }) {
   setTitle(name);
   const size = flock.params.render?.size_px ?? flock.image_size_px;
   const last = flock.frames - 1;
-  /** @type {Promise<any> | null} */
+  /** @type {Promise<import("../flock/plan.js").Plan> | null} */
   let planned = null;
   const plan = () => {
     planned ??= planOf(flock.id, life);
@@ -122,8 +122,8 @@ export async function show(root, { id, query, life }) {
   }
 }
 
-/** Returns length, size, seed, age and bytes of a flock. @param {any} flock @param {number[]} size */
+/** Returns length, size, seed, age and bytes of a flock. @param {Api.Flock} flock @param {number[]} size */
 const factsOf = ({ frames, fps, seed, created_at, size_bytes }, size) => [seconds(frames / fps), size.join(" × "), say("flock.seed", { seed: String(seed) }), say("reel.all_files", { size: bytesOf(size_bytes) }), ago(created_at)].join(" · ");
 
-/** Returns the advice of the service as sentences. @param {any} flock */
-const adviceOf = (flock) => (flock.advice ?? []).filter((/** @type {any} */ one) => !IN_FACTS.includes(one.code)).map((/** @type {any} */ { code, sentence }) => ({ code, sentence: sayOr(`reel.advice.${code}`, sentence[0].toUpperCase() + sentence.slice(1)) }));
+/** Returns the advice of the service as sentences. @param {Api.Flock} flock */
+const adviceOf = (flock) => (flock.advice ?? []).filter(({ code }) => !IN_FACTS.includes(code)).map(({ code, sentence }) => ({ code, sentence: sayOr(`reel.advice.${code}`, sentence[0].toUpperCase() + sentence.slice(1)) }));

@@ -32,7 +32,7 @@ export async function show(root, { query, life }) {
   root.append(element("header.place-head", {}, element("h1", { tabIndex: -1 }, say("reels.title")), element("div.reels-search", {}, search)), running, found, empty, trouble, cards, element("p", {}, more));
   /** @type {{id: string, name: string, node: HTMLElement}[]} */
   let all = [];
-  /** @type {string | null} */
+  /** @type {Api.Next<"/v1/flocks">} */
   let next = `/v1/flocks?limit=${PAGE}`;
   /** The loading under way: pages come one after another. @type {Promise<void>} */
   let turn = Promise.resolve();
@@ -43,7 +43,7 @@ export async function show(root, { query, life }) {
   const fill = (limit) => {
     turn = turn.catch(() => {}).then(async () => {
       if (!next || life.aborted) return;
-      const page = await list(next.replace(/limit=\d+/, `limit=${limit}`), life);
+      const page = await list(/** @type {`/v1/flocks?${string}`} */ (next.replace(/limit=\d+/, `limit=${limit}`)), life);
       const made = await Promise.all(page.items.filter((flock) => !all.some((one) => one.id === flock.id)).map(entry));
       all.push(...made);
       cards.append(...made.map(({ node }) => node));
@@ -60,7 +60,7 @@ export async function show(root, { query, life }) {
     cards.prepend(...made.map(({ node }) => node));
     sift();
   };
-  const entry = async (/** @type {any} */ flock) => {
+  const entry = async (/** @type {Api.Flock} */ flock) => {
     const [node, name] = await Promise.all([flockCard(flock), flockName(flock)]);
     const studio = element("a.button.quiet", { href: `/libraries/${flock.library_id}/studio`, "aria-label": say("reels.studio.of", { name }) }, say("reels.studio"));
     fields.then((known) => { studio.href = studioAddress(flock, known); }).catch(() => {});

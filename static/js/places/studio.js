@@ -36,7 +36,7 @@ export async function show(root, visit) {
   const { settings: start, unknown } = readQuery(query, fields);
   const settings = createSettings(start);
   const tool = signal("");
-  let [moment, planned] = [query.get("t"), /** @type {{plan: any, settings: any}} */ ({ plan: null, settings: {} })];
+  let [moment, planned] = [query.get("t"), /** @type {{plan: import("../flock/plan.js").Plan | null, settings: import("../studio/settings.js").Settings}} */ ({ plan: null, settings: {} })];
 
   /** The value in force: the person's, else that of the plan, else the default. @param {string} name */
   const valueOf = (name) => {
@@ -134,7 +134,7 @@ async function fill(root, visit) {
   if (hadFocus) /** @type {HTMLElement | null} */ (root.querySelector("h1"))?.focus({ preventScroll: true });
 }
 
-/** The choice of the animal, if there are several. @param {any[]} libraries @param {string} libraryId @param {() => string} query */
+/** The choice of the animal, if there are several. @param {Api.Library[]} libraries @param {string} libraryId @param {() => string} query */
 function animals(libraries, libraryId, query) {
   const options = libraries.map((one) => element("option", { value: one.id, selected: one.id === libraryId }, filmName(one)));
   const choose = element("select.animals", { "aria-label": say("studio.animal"), onchange: () => go(`/libraries/${choose.value}/studio?${query()}`) }, ...options);

@@ -17,7 +17,7 @@ const TOKENS = ["ink", "ink-soft", "line", "accent", "water", "sunken"];
 
 /**
  * Returns a part that opens, loads flock.json when it does, and follows the moment of the reel.
- * @param {any} flock @param {{seek: (frame: number) => void, life: AbortSignal}} options
+ * @param {Api.Flock} flock @param {{seek: (frame: number) => void, life: AbortSignal}} options
  */
 export function askedAndShown(flock, { seek, life }) {
   const box = element("div.asked-box");
@@ -42,12 +42,12 @@ export function askedAndShown(flock, { seek, life }) {
   return { node, setFrame(/** @type {number} */ now) { frame = now; plot?.setFrame(now); } };
 }
 
-/** @param {any} made flock.json @param {{seek: (frame: number) => void, life: AbortSignal}} options */
+/** @param {Api.FlockFile} made flock.json @param {{seek: (frame: number) => void, life: AbortSignal}} options */
 function plotOf({ individuals, fps }, { seek, life }) {
   const canvas = element("canvas.asked-plot", { role: "img", "aria-label": say("reel.asked.label") });
   const words = element("p.asked-words");
   const table = element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("reel.asked.pieces") });
-  const choose = element("select", { onchange: () => take() }, ...individuals.map((/** @type {any} */ one) => element("option", { value: String(one.id) }, say("reel.asked.animal", { id: String(one.id) }))));
+  const choose = element("select", { onchange: () => take() }, ...individuals.map((one) => element("option", { value: String(one.id) }, say("reel.asked.animal", { id: String(one.id) }))));
   const last = () => Math.max(1, one.heading_rad.length);
   let one = individuals[0];
   let pieces = piecesOf(one);

@@ -8,7 +8,7 @@ import { filesOf, savedName } from "./settings.js";
 /** Time after which a size is left out, ms. */
 const SIZE_MS = 4000;
 
-/** @param {any} flock @param {string} film name of the film @param {AbortSignal} life */
+/** @param {Api.Flock} flock @param {string} film name of the film @param {AbortSignal} life */
 export function fileTable(flock, film, life) {
   const heads = ["name", "use", "size"].map((name) => element("th", { scope: "col" }, say(`reel.files.${name}`)));
   const rows = filesOf(flock).map((name) => row(name, { flock, film, life }));
@@ -16,12 +16,12 @@ export function fileTable(flock, film, life) {
     element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("reel.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
 }
 
-/** @param {string} name @param {{flock: any, film: string, life: AbortSignal}} of */
+/** @param {string} name @param {{flock: Api.Flock, film: string, life: AbortSignal}} of */
 function row(name, { flock, film, life }) {
   const address = `/v1/flocks/${flock.id}/${name}`;
-  const told = (flock.files ?? []).find((/** @type {any} */ file) => file.name === name);
+  const told = (flock.files ?? []).find((file) => file.name === name);
   const bytes = element("td.size", {}, told ? size(told.size_bytes) : "");
-  const node = element("tr", {}, element("th", { scope: "row" }, element("a", { href: address, download: savedName(name, flock, film) }, name)), element("td", {}, sayOr(`reel.file.${name}`, told?.what ?? "")), bytes);
+  const node = element("tr", {}, element("th", { scope: "row" }, element("a", { href: address, download: savedName(name, flock, film) }, name)), element("td", {}, sayOr(`reel.file.${name}`, "")), bytes);
   if (!told) sizeOf(address, life).then((n) => { if (n > 0) bytes.textContent = size(n); }, (problem) => { if (problem.status === 404) node.remove(); });
   return node;
 }

@@ -32,7 +32,7 @@ export function film({ src, poster, fps, n_frames, label, life, onFrame, onState
     video.currentTime = (wanted + 0.5) / fps;
     wanted = -1;
   };
-  const onPicture = (/** @type {number} */ _, /** @type {any} */ { mediaTime }) => {
+  const onPicture = (/** @type {number} */ _, /** @type {VideoFrameCallbackMetadata} */ { mediaTime }) => {
     if (life.aborted) return;
     if (wanted < 0 && !isSeeking) show(Math.round(mediaTime * fps));
     video.requestVideoFrameCallback(onPicture);

@@ -13,7 +13,7 @@ const LIVES_S = { hour: 3600, day: 86_400, week: 604_800 };
 /** The choice of a page, among names of files. */
 const PAGE = "page";
 
-/** @param {any} flock @param {AbortSignal} life */
+/** @param {Api.Flock} flock @param {AbortSignal} life */
 export function linkMaker(flock, life) {
   const file = element("select", {}, element("option", { value: PAGE }, say("reel.link.page")), ...filesOf(flock).map((name) => element("option", { value: name }, name)));
   const lasting = element("select", {}, ...Object.keys(LIVES_S).map((name) => element("option", { value: name, selected: name === "day" }, say(`reel.link.${name}`))));

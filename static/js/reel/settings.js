@@ -5,7 +5,7 @@ import { OFFERED, SHARED } from "./shared-link.js";
 
 /**
  * Returns the settings of a flock that differ from the defaults, as the studio names them.
- * @param {any} params of the flock @param {import("../studio/schema.js").Fields} fields
+ * @param {Api.FlockParams} params of the flock @param {import("../studio/schema.js").Fields} fields
  */
 export function changedOf(params, fields) {
   /** @type {import("../studio/settings.js").Settings} */
@@ -21,10 +21,10 @@ export function changedOf(params, fields) {
   return changed;
 }
 
-/** @param {any} a @param {any} b */
+/** @param {unknown} a @param {unknown} b */
 const isSame = (a, b) => JSON.stringify(a ?? null) === JSON.stringify(b ?? null);
 
-/** Returns the address of the studio with the settings of a flock. @param {any} flock @param {import("../studio/schema.js").Fields} fields */
+/** Returns the address of the studio with the settings of a flock. @param {Api.Flock} flock @param {import("../studio/schema.js").Fields} fields */
 export function studioAddress(flock, fields) {
   const query = writeQuery(changedOf(flock.params, fields));
   return `/libraries/${flock.library_id}/studio${query && `?${query}`}`;
@@ -33,24 +33,24 @@ export function studioAddress(flock, fields) {
 /** Files by the format that makes them. */
 const OF_FORMAT = { webm: "video.webm", mov: "video.mov", png: "frames.zip", gif: "preview.gif", webp: "preview.webp", poster: "poster.png" };
 
-/** Returns the names of the files of a flock, in the order of use. @param {any} flock @returns {string[]} */
+/** Returns the names of the files of a flock, in the order of use. @param {Api.Flock} flock @returns {string[]} */
 export function filesOf(flock) {
-  if (flock.files) return flock.files.map((/** @type {any} */ file) => file.name);
+  if (flock.files) return flock.files.map((file) => file.name);
   const { formats = [], overlay = false, ground_truth = true } = flock.params.render ?? {};
-  const wanted = Object.entries(OF_FORMAT).flatMap(([format, name]) => (formats.includes(format) ? [name] : []));
+  const wanted = Object.entries(OF_FORMAT).flatMap(([format, name]) => (formats.some((one) => one === format) ? [name] : []));
   return ["video.mp4", ...wanted, ...(overlay ? ["overlay.mp4"] : []), ...(ground_truth ? ["tracks.csv", "ground-truth.zip"] : []), "flock.json", "flock.plan", "plan.svg"];
 }
 
-/** Returns the name of the transparent film of a transparent flock, if there is one. @param {any} flock @returns {string | undefined} */
+/** Returns the name of the transparent film of a transparent flock, if there is one. @param {Api.Flock} flock @returns {string | undefined} */
 const clearFileOf = (flock) => (flock.params.render?.background === "transparent" ? Object.values(OFFERED).find((name) => filesOf(flock).includes(name)) : undefined);
 
-/** Returns the name of the film that a person expects. @param {any} flock */
+/** Returns the name of the film that a person expects. @param {Api.Flock} flock */
 export const filmFileOf = (flock) => clearFileOf(flock) ?? "video.mp4";
 
-/** Returns the names of the files that a link for friends opens. @param {any} flock @returns {string[]} */
+/** Returns the names of the files that a link for friends opens. @param {Api.Flock} flock @returns {string[]} */
 export const sharedFilesOf = (flock) => [...SHARED, clearFileOf(flock) ?? ""].filter(Boolean);
 
-/** Returns the name under which a file is saved, such as "goldfish_20x400_s1.mp4". @param {string} name @param {any} flock @param {string} film */
+/** Returns the name under which a file is saved, such as "goldfish_20x400_s1.mp4". @param {string} name @param {Api.Flock} flock @param {string} film */
 export function savedName(name, { count, frames, seed }, film) {
   const stem = `${film.replace(/[^\p{L}\p{N}._-]+/gu, "-").replace(/^[-.]+|-+$/g, "") || "flock"}_${count}x${frames}_s${seed}`;
   return /^(video|flock)\./.test(name) ? stem + name.slice(name.indexOf(".")) : `${stem}_${name}`;

@@ -9,14 +9,14 @@ const GOLDEN_DEG = 137.508;
 export const colorOf = (id) => `hsl(${((id * GOLDEN_DEG) % 360).toFixed(0)} 90% 66%)`;
 
 /**
- * Returns a function that draws the shapes of a frame. @param {any} plan @param {any} atlas
+ * Returns a function that draws the shapes of a frame. @param {import("../flock/plan.js").Plan} plan @param {import("../flock/atlas.js").Atlas} atlas
  */
 export function shapesOf(plan, atlas) {
-  const indices = new Map(plan.head.individuals.map((/** @type {any} */ one, /** @type {number} */ i) => [one.id, i]));
+  const indices = new Map(plan.head.individuals.map((one, i) => [one.id, i]));
   const scratch = /** @type {HTMLCanvasElement} */ (document.createElement("canvas"));
   const pen = /** @type {CanvasRenderingContext2D} */ (scratch.getContext("2d"));
 
-  /** @param {any} sprite @param {string} color */
+  /** @param {import("../flock/atlas.js").Sprite} sprite @param {string} color */
   function fill({ page, x, y, w, h }, color) {
     // A larger canvas than needed is cheaper than one that changes its size.
     if (scratch.width < w || scratch.height < h) [scratch.width, scratch.height] = [Math.max(scratch.width, w), Math.max(scratch.height, h)];

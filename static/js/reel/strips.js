@@ -11,15 +11,16 @@ const HEIGHT = 100;
 const EDGE = 6;
 
 /** Quantities with the most of their axis; null fits the axis to the values. */
+/** @type {{name: Api.FlockFigure, most: number | null}[]} */
 const SERIES = [{ name: "polarization", most: 1 }, { name: "milling", most: 1 }, { name: "nearest_neighbor_bl", most: null }];
 
-/** Returns the quantities that a plan tells for each frame. @param {any} plan */
+/** Returns the quantities that a plan tells for each frame. @param {import("../flock/plan.js").Plan} plan */
 export function seriesOf({ head: { stats }, nFrames, nIndividuals }) {
   const told = stats?.per_frame ?? {};
   return SERIES.flatMap(({ name, most }) => {
     const values = told[name];
     if (nIndividuals < 2 || values?.length !== nFrames || !values.every(Number.isFinite)) return [];
-    const mean = stats[name] ?? values.reduce((/** @type {number} */ a, /** @type {number} */ b) => a + b, 0) / values.length;
+    const mean = stats[name] ?? values.reduce((a, b) => a + b, 0) / values.length;
     return [{ name, values, mean, most: most ?? roundUp(Math.max(...thin(values, POINTS))) }];
   });
 }
@@ -45,7 +46,7 @@ const exact = new Intl.NumberFormat(language, { minimumFractionDigits: 2, maximu
 const told = (/** @type {number} */ value) => exact.format(value);
 
 /**
- * @param {any} plan @param {{seek: (frame: number) => void}} options
+ * @param {import("../flock/plan.js").Plan} plan @param {{seek: (frame: number) => void}} options
  * @returns {{node: HTMLElement, setFrame: (frame: number) => void} | null} null for one animal
  */
 export function strips(plan, { seek }) {
@@ -87,7 +88,7 @@ function row({ name, values, mean, most }, { last, seek }) {
   };
 }
 
-/** @param {any} plan @param {{name: string, values: number[]}[]} all */
+/** @param {import("../flock/plan.js").Plan} plan @param {{name: string, values: number[]}[]} all */
 function tableOf({ nFrames, fps }, all) {
   const n_rows = Math.min(ROWS, nFrames);
   const frames = Array.from({ length: n_rows }, (_, k) => Math.round((k / Math.max(1, n_rows - 1)) * (nFrames - 1)));

@@ -17,7 +17,7 @@ const SHAPE_OPACITY = 0.6;
 const FILL_MS = 200;
 
 /**
- * @param {{flock: any, plan: () => Promise<any>, on: string[], size: () => number[], life: AbortSignal, onChange: (on: string[]) => void, onProblem: (problem: any) => void}} options
+ * @param {{flock: Api.Flock, plan: () => Promise<import("../flock/plan.js").Plan>, on: string[], size: () => number[], life: AbortSignal, onChange: (on: string[]) => void, onProblem: (problem: any) => void}} options
  *   `on`: parts that are shown; `size`: width and height of the video, pixels
  */
 export function truthLayer({ flock, plan, on, size, life, onChange, onProblem }) {
@@ -25,7 +25,7 @@ export function truthLayer({ flock, plan, on, size, life, onChange, onProblem })
   const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
   const layer = /** @type {HTMLCanvasElement} */ (document.createElement("canvas"));
   let tracks = createTracks();
-  /** @type {Promise<any> | null} */
+  /** @type {Promise<void> | null} */
   let loading = null;
   /** @type {Promise<void> | null} */
   let shaping = null;

@@ -11,7 +11,7 @@ import { film } from "./film.js";
 export const VIEWS = ["film", "living"];
 
 /**
- * @param {{flock: any, plan: () => Promise<any>, size: number[], poster: string | undefined, startFrame: number | null, life: AbortSignal,
+ * @param {{flock: Api.Flock, plan: () => Promise<import("../flock/plan.js").Plan>, size: number[], poster: string | undefined, startFrame: number | null, life: AbortSignal,
  *   onFrame: (frame: number) => void, onState: (isPlaying: boolean) => void, onProblem: (problem: any) => void}} options
  *   `startFrame`: the flock rests at this frame; null plays
  */
@@ -29,9 +29,9 @@ export function createViews({ flock, plan, size, poster, startFrame, life, onFra
   stage.dataset.look = "film";
   const shot = film({ src: `/v1/flocks/${flock.id}/video.mp4`, poster, fps: flock.fps, n_frames: flock.frames, label: say("reel.film"), life, ...from("film"), onBroken: () => stage.append(element("p.stage-note", {}, say("reel.broken"))) });
   stage.append(shot.node);
-  /** @type {Promise<any> | null} */
+  /** @type {Promise<import("../parts/living.js").Living> | null} */
   let loading = null;
-  /** @type {any} */
+  /** @type {import("./film.js").View | null} */
   let alive = null;
 
   /** The living flock; made when it is asked for. */

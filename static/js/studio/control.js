@@ -54,7 +54,7 @@ function toggle(field, studio) {
   const { node, setReset } = framed(field, studio, { input, before: true });
   return {
     node, name: field.name,
-    update(value, { isSet, isIdle }) {
+    update(value, { isSet, isIdle = false }) {
       input.checked = value === true;
       input.disabled = isIdle;
       setReset(isSet, isIdle);
@@ -69,7 +69,7 @@ function choice(field, studio) {
   const { node, setReset } = framed(field, studio, { input });
   return {
     node, name: field.name,
-    update(value, { isSet, isIdle }) {
+    update(value, { isSet, isIdle = false }) {
       input.value = value ?? "";
       input.disabled = isIdle;
       setReset(isSet, isIdle);

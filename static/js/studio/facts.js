@@ -8,7 +8,7 @@ const CLONES = 0.05;
 /** Steps of animals from which the order is computed, so that the page does not halt. */
 const MOST_CELLS = 20_000;
 
-/** Returns the sentences about a plan. @param {any} plan */
+/** Returns the sentences about a plan. @param {import("../flock/plan.js").Plan} plan */
 function sentencesOf({ head: { stats }, nIndividuals: n, isPart, nFrames, fps }) {
   const facts = [];
   const advice = [];
@@ -28,7 +28,7 @@ function sentencesOf({ head: { stats }, nIndividuals: n, isPart, nFrames, fps })
   return { facts, advice };
 }
 
-/** Returns the order of a flock over time: as told, or from the steps of the animals. @param {any} plan @returns {number[]} */
+/** Returns the order of a flock over time: as told, or from the steps of the animals. @param {import("../flock/plan.js").Plan} plan @returns {number[]} */
 export function orderOf(plan) {
   const told = plan.head.stats?.per_frame?.polarization;
   if (told?.length) return told;
@@ -57,7 +57,7 @@ export function factsBox() {
   const node = element("section.about", { hidden: true }, element("h2", {}, say("facts.title")), cards, sentences, element("details", {}, element("summary", {}, say("facts.all")), table));
   return {
     node,
-    /** @param {any} plan */
+    /** @param {import("../flock/plan.js").Plan} plan */
     update(plan) {
       node.hidden = false;
       const { facts, advice } = sentencesOf(plan);

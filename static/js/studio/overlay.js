@@ -28,7 +28,7 @@ export function overlay({ canvas, size, life, tool, placed, length_s, change, on
   const all = () => thingsOf(placed());
   const find = (/** @type {string} */ key) => all().find((one) => one.key === key);
   const pointOf = (/** @type {PointerEvent} */ event) => {
-    const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(layer.getScreenCTM().inverse());
+    const { x, y } = new DOMPoint(event.clientX, event.clientY).matrixTransform(layer.getScreenCTM()?.inverse());
     return [x, y];
   };
 
@@ -136,7 +136,7 @@ export function overlay({ canvas, size, life, tool, placed, length_s, change, on
   life.addEventListener("abort", () => observer.disconnect());
   return {
     node: layer, draw, add, remove, select,
-    /** Marks the predator of a plan. @param {any} plan @param {number} frame */
+    /** Marks the predator of a plan. @param {import("../flock/plan.js").Plan} plan @param {number} frame */
     mark(plan, frame) {
       const at = plan.head.predator?.[frame % plan.nFrames];
       hunter.toggleAttribute("hidden", !at);

@@ -18,7 +18,7 @@ const BUSY_MS = 700;
 const USUAL_COUNT = 20;
 
 /**
- * @param {{libraryId: string, life: AbortSignal, onPlan: (plan: any, settings: any) => void, onBusy: (isBusy: boolean) => void,
+ * @param {{libraryId: string, life: AbortSignal, onPlan: (plan: import("../flock/plan.js").Plan, settings: any) => void, onBusy: (isBusy: boolean) => void,
  *   onProblem: (problem: any) => void}} options
  */
 export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
@@ -29,12 +29,12 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
   /** @type {AbortController | null} */
   let running = null;
   let [timer, since, filled, pinned, planning] = [0, 0, USUAL_COUNT, "", ""];
-  /** The plan that is shown, as it came. @type {{plan: any, settings: any} | null} */
+  /** The plan that is shown, as it came. @type {{plan: import("../flock/plan.js").Plan, settings: any} | null} */
   let shown = null;
   /** The settings of the newest request. @type {any} */
   let newest = null;
 
-  /** @param {any} plan @param {any} settings */
+  /** @param {import("../flock/plan.js").Plan} plan @param {any} settings */
   function tell(plan, settings) {
     shown = { plan, settings };
     onPlan(dressed(plan, settings), settings);
@@ -61,7 +61,7 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
     return undefined;
   }
 
-  /** @param {any} plan @param {any} settings */
+  /** @param {import("../flock/plan.js").Plan} plan @param {any} settings */
   function finish(plan, settings) {
     running?.abort();
     running = wanted = null;
@@ -97,7 +97,7 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
     }
   }
 
-  /** @param {any} settings @param {AbortSignal} signal @param {(plan: any) => void} onFirst */
+  /** @param {any} settings @param {AbortSignal} signal @param {(plan: import("../flock/plan.js").Plan) => void} onFirst */
   async function planOf(settings, signal, onFirst) {
     const body = bodyOf(ofPlan(settings));
     const n = body.count ?? filled;
@@ -114,7 +114,7 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
     return Object.assign(plan, { isPart: frames > most });
   }
 
-  /** @param {any} settings @param {any} plan */
+  /** @param {any} settings @param {import("../flock/plan.js").Plan} plan */
   function keep(settings, plan) {
     kept.delete(keyOf(settings));
     kept.set(keyOf(settings), plan);
@@ -140,7 +140,7 @@ const ofPlan = (settings) => Object.fromEntries(Object.entries(settings).filter(
 /** @param {any} settings */
 const keyOf = (settings) => writeQuery(ofPlan(settings));
 
-/** Returns a plan that is drawn as the settings say. @param {any} plan @param {any} settings */
+/** Returns a plan that is drawn as the settings say. @param {import("../flock/plan.js").Plan} plan @param {any} settings */
 function dressed(plan, settings) {
   const { params } = plan.head;
   return { ...plan, head: { ...plan.head, params: { ...params, render: { ...params.render, ...bodyOf(settings).render } } } };

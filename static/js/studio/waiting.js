@@ -16,7 +16,7 @@ const ANIMALS = 200;
 
 /**
  * Returns the cards of the measurements under way; hidden if there are none. Those that fail stay and tell why.
- * @param {{life: AbortSignal, isMeant?: (job: any) => boolean, onMeasured: (libraryId: string) => void}} options
+ * @param {{life: AbortSignal, isMeant?: (job: Api.Job) => boolean, onMeasured: (libraryId: string) => void}} options
  *   `isMeant`: jobs that matter here; onMeasured hears of each that is done
  */
 export function underWay({ life, isMeant = () => true, onMeasured }) {
@@ -61,7 +61,7 @@ export async function showWaiting(root, { id, life, onMeasured }) {
 
 /**
  * Returns the library with this id, or the newest one, and all to choose from; null while it is measured or if there is
- * none. @param {string} id @param {AbortSignal} life @returns {Promise<{library: any, libraries: any[]} | null>}
+ * none. @param {string} id @param {AbortSignal} life @returns {Promise<{library: Api.Library, libraries: Api.Library[]} | null>}
  */
 export async function findLibrary(id, life) {
   const asked = id ? thing("libraries", id) : null;
