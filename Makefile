@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -26,7 +26,7 @@ demo: build ## film -> library -> flock.mp4, without a server
 	$(RELEASE) flock target/demo/library -o flock.mp4 --count 20 --frames 400
 	@echo "the flock is in flock.mp4"
 
-check: fmt clippy unit scale-test truth-test page-test contract-test stress-test docs deny ## run all checks of CI
+check: fmt clippy unit scale-test truth-test page-types page-test contract-test stress-test docs deny ## run all checks of CI
 	@echo "all checks passed"
 
 fmt: ## check the formatting
@@ -60,6 +60,11 @@ race: target/vendor ## let eight processes race for 2000 jobs, on SQLite and on 
 truth-test: target/vendor ## read the ground truth of a flock with pycocotools and TrackEval
 	$(CARGO) test --locked --workspace --no-run
 	@scripts/python-tests.sh truth $(DEBUG)
+
+page-types: vendor ## check the types of the page's modules against the OpenAPI document
+	@scripts/system-packages.sh vendor run
+	$(CARGO) test --locked --workspace --no-run
+	@python3 -B scripts/page-types.py $(DEBUG)
 
 page-test: vendor ## test the page in a browser, against a running service
 	$(CARGO) test --locked --workspace --no-run
