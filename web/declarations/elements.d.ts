@@ -7,5 +7,7 @@ declare namespace Page {
   type Given<Value> = [Value] extends [string] ? Value | number : Value;
   type Attributes = { role?: string; [name: `${string}-${string}`]: string | number | boolean | null | undefined };
   type Props<Made> = { [Name in keyof Made]?: Given<Made[Name]> | null } & Attributes;
+  /** What a worker's `self` has besides what a window has. */
+  type Worker = { onmessage: ((event: MessageEvent) => void) | null; postMessage(message: unknown, transfer?: Transferable[]): void };
   type Child = Node | string | null | undefined | false | 0;
 }

@@ -49,7 +49,7 @@ export async function request(method, path, { body, accept, signal, headers = {}
   return response;
 }
 
-/** @param {string} method @param {string} path @param {any} [options] @returns {Promise<any>} the JSON of the response; null if it has none */
+/** @param {string} method @param {string} path @param {Parameters<typeof request>[2]} [options] @returns {Promise<any>} the JSON of the response; null if it has none */
 async function call(method, path, options) {
   const text = await (await request(method, path, options)).text();
   return text ? JSON.parse(text) : null;

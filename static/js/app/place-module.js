@@ -10,7 +10,7 @@ const PAUSE_MS = 10_000;
 /**
  * Loads the module of a place.
  * @param {string} name @param {AbortSignal} life that of the place
- * @param {(problem: any) => void} tell called if the service is away @returns {Promise<any>}
+ * @param {(problem: import("./api.js").Problem) => void} tell called if the service is away @returns {Promise<import("./router.js").Place>}
  */
 export async function placeModule(name, life, tell) {
   try {

@@ -10,7 +10,7 @@ const RESUMED_BYTES = 4e6;
 const PIECE_BYTES = 8e6;
 
 /**
- * @typedef {{id: number, name: string, address: string, sent: number, total: number, state: "sending" | "checking" | "failed" | "paused", problem: any, cancel: () => void}} Upload
+ * @typedef {{id: number, name: string, address: string, sent: number, total: number, state: "sending" | "checking" | "failed" | "paused", problem: unknown, cancel: () => void}} Upload
  *   address: the film itself, in this tab
  */
 

@@ -9,8 +9,8 @@ const REPORT_MS = 300;
 /** Most jumps that are sent, the best first. More cannot be told apart on a screen. */
 const MOST_JUMPS = 2000;
 
-/** @type {any} */
-const page = self;
+/** @type {Page.Worker} The declarations of tsc are those of a window. */
+const page = /** @type {any} */ (self);
 page.onmessage = (/** @type {MessageEvent} */ { data }) => {
   load(data).then((message) => page.postMessage(message, buffersOf(message.columns)), (error) => page.postMessage({ failed: { status: error.status ?? 0, text: error.text ?? "" } }));
 };
@@ -33,7 +33,7 @@ async function fetched(address) {
 
 /** @param {string} address @param {import("./columns.js").Columns} columns @param {number | null} length_px */
 async function loadPoses(address, columns, length_px) {
-  const reader = /** @type {ReadableStream<string>} */ (/** @type {any} */ ((await fetched(address)).body).pipeThrough(new TextDecoderStream())).getReader();
+  const reader = /** @type {ReadableStream<BufferSource>} */ ((await fetched(address)).body).pipeThrough(new TextDecoderStream()).getReader();
   let [rest, head, n_derived, next, pause_ms] = ["", "", 0, performance.now() + REPORT_MS, REPORT_MS];
   for (;;) {
     const { value, done } = await reader.read();
@@ -72,9 +72,10 @@ async function loadPoses(address, columns, length_px) {
 function longer(old) {
   const columns = emptyColumns(2 * old.n, old.fps);
   if (old.hasMidline) columns.midline_px = new Float32Array(2 * old.midline_px.length).fill(NaN);
+  const into = /** @type {Record<string, unknown>} */ (columns);
   for (const [name, value] of Object.entries(old)) {
-    if (ArrayBuffer.isView(value)) /** @type {any} */ (columns)[name].set(value);
-    else /** @type {any} */ (columns)[name] = value;
+    if (ArrayBuffer.isView(value)) /** @type {Float64Array} */ (into[name]).set(/** @type {Float64Array} */ (value));
+    else into[name] = value;
   }
   return columns;
 }

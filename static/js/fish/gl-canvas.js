@@ -4,7 +4,7 @@ import { element } from "../app/element.js";
 import { fishDrawer } from "./gl.js";
 
 /**
- * @param {{fish: import("./glb.js").VirtualFish, life: AbortSignal, props: any,
+ * @param {{fish: import("./glb.js").VirtualFish, life: AbortSignal, props: Page.Props<HTMLCanvasElement>,
  *   sceneAt: (width: number, height: number) => import("./gl.js").Scene}} options sizes in pixels of the canvas
  * @returns {{canvas: HTMLCanvasElement, ask: () => void} | null} null without WebGL 2
  */

@@ -18,7 +18,7 @@ export const depthFor = (radius, aspect) => radius / Math.sin(FREE_RAD / 2) / Ma
 
 /**
  * Returns the lens of the camera that filmed the animal, or null if it is unknown.
- * @param {any} camera the measured one, of the parameters of the analysis @param {number | null} yfov of the file, radians
+ * @param {Api.Schemas["CameraParams"] | null | undefined} camera the measured one, of the parameters of the analysis @param {number | null} yfov of the file, radians
  * @param {number[]} size of the film, pixels @param {number} reach the farthest depth that matters, metres @returns {Lens | null}
  */
 export function filmLens(camera, yfov, [width, height], reach) {

@@ -8,28 +8,29 @@ import { problemBox } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
 import { control } from "../studio/control.js";
 import { loadFields } from "../studio/schema.js";
+import { at } from "../studio/settings.js";
 import { changedFrom, PAPERS, shownAs } from "./settings.js";
 
 /** Names in the order of use; the service may tell more. */
 const ORDER = ["palette", "swim", "bank_rad", "smooth_s", "bridge_s", "length_m", "height_m"];
 
 /**
- * @param {{library: Api.Library, params: any, life: AbortSignal, onMade: (id: string) => void}} options params: of the fish that is shown, null = none
+ * @param {{library: Api.Library, params: Api.FishParams | null, life: AbortSignal, onMade: (id: string) => void}} options params: of the fish that is shown, null = none
  */
 export async function optionsBox({ library, params, life, onMade }) {
   const fields = new Map([...await loadFields("Fish")].map(([name, field]) => [name, shownAs(field, library)]));
   const names = [...new Set([...ORDER, ...fields.keys()])].filter((name) => fields.has(name) && name !== "preset");
   let settings = changedFrom(params, fields);
-  /** @param {Record<string, any>} patch undefined = the default */
+  /** @param {Api.FishParams} patch undefined = the default */
   const change = (patch) => {
     settings = changedFrom({ ...settings, ...patch }, fields);
     update();
   };
-  const controls = names.map((name) => control(/** @type {any} */ (fields.get(name)), { change, fields }));
+  const controls = names.map((name) => control(/** @type {import("./settings.js").ShownField} */ (fields.get(name)), { change, fields }));
   const update = () => {
     for (const { name, update: show } of controls) {
-      const field = /** @type {any} */ (fields.get(name));
-      show(settings[name] ?? field.default, { isSet: name in settings, perUnit: field.perUnit });
+      const field = /** @type {import("./settings.js").ShownField} */ (fields.get(name));
+      show(at(settings, name) ?? field.default, { isSet: name in settings, perUnit: field.perUnit });
     }
   };
   const papers = element("button.quiet", { type: "button", onclick: () => change(PAPERS) }, say("fish.papers"));
@@ -41,7 +42,7 @@ export async function optionsBox({ library, params, life, onMade }) {
 
 /**
  * Returns the button that makes a virtual fish, and where its progress is shown.
- * @param {{libraryId: string, settings: () => any, life: AbortSignal, onMade: (id: string) => void, isFirst?: boolean}} options
+ * @param {{libraryId: string, settings: () => Api.FishParams, life: AbortSignal, onMade: (id: string) => void, isFirst?: boolean}} options
  */
 export function maker({ libraryId, settings, life, onMade, isFirst = false }) {
   const button = element("button.make-fish", { type: "button", onclick: make }, say(isFirst ? "fish.make" : "fish.make.other"));
@@ -64,7 +65,7 @@ export function maker({ libraryId, settings, life, onMade, isFirst = false }) {
 
   /** Shows a job until it has ended. @param {string} jobId */
   async function follow(jobId) {
-    /** @type {any} */
+    /** @type {ReturnType<typeof jobCard> | null} */
     let card = null;
     const done = await ended(jobId, life, (job) => {
       if (!card) state.replaceChildren(card = jobCard(job));

@@ -12,6 +12,7 @@ import { followPointers, turnButtons } from "./turning.js";
 
 export const VIEWS = ["near", "whole", "filmed"];
 /** How each view begins: a little from above, except as filmed. */
+/** @type {Record<string, import("./orbit.js").Turned>} */
 const STARTS = { near: { yaw: 0, pitch: 0.2, zoom: 1 }, whole: { yaw: 0.35, pitch: 0.35, zoom: 1 }, filmed: { yaw: 0, pitch: 0, zoom: 1 } };
 const LINES = { floor: [0.45, 0.75, 0.82, 0.28], way: [1, 0.62, 0.4, 0.85], plumb: [0.75, 0.92, 0.95, 0.5] };
 
@@ -46,7 +47,7 @@ export function createSpace({ fish, lens, size, fps, isFromAbove, life }) {
     return { posture, lines, lens: freeLens(width / height, depth), box: [0, 0, width, height], ...viewOf(orbit.turned, isNear ? posture.place : middle, depth) };
   }
 
-  const radios = VIEWS.filter((one) => one !== "filmed" || lens).map((one) => element("label.choice", {}, element("input", { type: "radio", name: "fish-view", value: one, checked: one === view, onchange: () => { view = one; orbit.reset(/** @type {any} */ (STARTS)[one]); } }), element("span", {}, say(`fish.view.${one}`))));
+  const radios = VIEWS.filter((one) => one !== "filmed" || lens).map((one) => element("label.choice", {}, element("input", { type: "radio", name: "fish-view", value: one, checked: one === view, onchange: () => { view = one; orbit.reset(STARTS[one]); } }), element("span", {}, say(`fish.view.${one}`))));
   const controls = element("div.stage-controls", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("fish.view")), ...radios), turnButtons(orbit));
   const node = element("div.stage.space-stage", {}, canvas);
   node.style.aspectRatio = size.join(" / ");

@@ -16,7 +16,8 @@ export function followPointers(node, orbit, life) {
     const [a, b] = [...down.values()];
     return Math.hypot(a[0] - b[0], a[1] - b[1]);
   };
-  const on = (/** @type {string} */ name, /** @type {(event: any) => void} */ act, /** @type {any} */ options = {}) => node.addEventListener(name, act, { signal: life, ...options });
+  /** @template {keyof HTMLElementEventMap} K @param {K} name @param {(event: HTMLElementEventMap[K]) => void} act @param {AddEventListenerOptions} [options] */
+  const on = (name, act, options) => node.addEventListener(name, act, { signal: life, ...options });
   on("pointerdown", (event) => {
     if (event.button !== 0) return;
     node.setPointerCapture(event.pointerId);
@@ -31,7 +32,7 @@ export function followPointers(node, orbit, life) {
     if (down.size === 1) orbit.turn(-DRAG * (event.clientX - before[0]), DRAG * (event.clientY - before[1]));
     return undefined;
   });
-  for (const name of ["pointerup", "pointercancel"]) on(name, (event) => down.delete(event.pointerId));
+  for (const name of /** @type {const} */ (["pointerup", "pointercancel"])) on(name, (event) => down.delete(event.pointerId));
   on("wheel", (event) => {
     event.preventDefault();
     const lines = event.deltaMode === 1 ? 33 : 1;
@@ -40,7 +41,7 @@ export function followPointers(node, orbit, life) {
   on("dblclick", () => orbit.reset());
 }
 
-/** Shapes of the buttons, in a square of 24. */
+/** Shapes of the buttons, in a square of 24. @type {Record<string, string>} */
 const SHAPES = {
   left: "M14 5l-7 7 7 7", right: "M10 5l7 7-7 7", up: "M5 14l7-7 7 7", down: "M5 10l7 7 7-7",
   nearer: "M12 5v14M5 12h14", farther: "M5 12h14", reset: "M18 8a7 7 0 1 0 1 5M18 4v4h-4",
@@ -53,6 +54,6 @@ export function turnButtons(orbit) {
     nearer: () => orbit.zoom(ZOOM), farther: () => orbit.zoom(1 / ZOOM), reset: () => orbit.reset(),
   };
   const buttons = Object.entries(acts).map(([name, act]) => element("button.quiet.icon", { type: "button", title: say(`fish.turn.${name}`), "aria-label": say(`fish.turn.${name}`), onclick: act },
-    svg("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" }, svg("path", { d: /** @type {any} */ (SHAPES)[name] }))));
+    svg("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" }, svg("path", { d: SHAPES[name] }))));
   return element("div.buttons.turn-buttons", { role: "group", "aria-label": say("fish.turn") }, ...buttons);
 }

@@ -40,16 +40,16 @@ async function save(event, href, download) {
   }
 }
 
-/** Returns what a virtual fish is, in a few words. @param {any} fish */
+/** Returns what a virtual fish is, in a few words. @param {Api.Fish} fish */
 const fishName = ({ params }) => [choiceOf("palette", params.palette ?? ""), params.swim === false && say("fish.rigid"), params.bank_rad === 0 && say("fish.upright")].filter(Boolean).join(", ");
 
 /**
  * Returns the table of the fish of a film with their downloads.
- * @param {any[]} all @param {{library: Api.Library, shown: string, life: AbortSignal, onDelete: (id: string) => void}} options
+ * @param {Api.Fish[]} all @param {{library: Api.Library, shown: string, life: AbortSignal, onDelete: (id: string) => void}} options
  */
 export function versionTable(all, { library, shown, life, onDelete }) {
   const film = filmName(library);
-  const file = (/** @type {any} */ fish, /** @type {string} */ name) => {
+  const file = (/** @type {Api.Fish} */ fish, /** @type {string} */ name) => {
     const ending = name.split(".")[1];
     const [href, download] = [`/v1/fish/${fish.id}/${name}`, savedName(film, fish.params, ending)];
     return element("a.file-link", { href, download, onclick: (/** @type {MouseEvent} */ event) => save(event, href, download) }, say(`fish.file.${ending}`));

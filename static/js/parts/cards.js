@@ -26,8 +26,8 @@ export const libraryCard = (library) => element("li.card-small", {}, element("a"
   picture(`/v1/libraries/${library.id}/poster.jpg`), element("strong", {}, filmName(library)), element("small", {}, [say("film.measured"), ago(library.created_at)].join(" · "))));
 
 /**
- * Returns the card of a film. @param {any} footage
- * @param {{library?: any, state?: Node | string}} [known] the newest library of the film, and what is known of its measurement
+ * Returns the card of a film. @param {Api.Footage} footage
+ * @param {{library?: Api.Library, state?: Node | string}} [known] the newest library of the film, and what is known of its measurement
  */
 export const filmCard = (footage, { library, state = "" } = {}) => element("li.card-small", {}, element("a", { href: `/films/${footage.id}` },
   library ? picture(`/v1/libraries/${library.id}/poster.jpg`) : filmPicture(footage),

@@ -21,9 +21,9 @@ const REST_MS = 4000;
 export function chase(flock, libraryId, life, { isOn = () => true, onEnd } = {}) {
   const note = element("p.playing", { hidden: true, role: "status" }, say("playing"));
   flock.node.append(note);
-  /** @type {Promise<any> | null} */
+  /** @type {ReturnType<typeof filmOf> | null} */
   let film = null;
-  /** @type {any} */
+  /** @type {ReturnType<typeof startFlee> | null} */
   let flee = null;
   /** @type {Path} */
   let path = [];
@@ -63,7 +63,7 @@ export function chase(flock, libraryId, life, { isOn = () => true, onEnd } = {})
     flee.point(at_px);
     return undefined;
   };
-  for (const name of ["pointermove", "pointerdown"]) flock.canvas.addEventListener(name, /** @type {any} */ (move), { signal: life });
+  for (const name of /** @type {const} */ (["pointermove", "pointerdown"])) flock.canvas.addEventListener(name, move, { signal: life });
   for (const name of ["pointerleave", "pointercancel"]) flock.canvas.addEventListener(name, end, { signal: life });
   life.addEventListener("abort", () => { clearTimeout(resting); flee?.stop(); });
 }

@@ -9,7 +9,7 @@ const TOLD_MS = 4000;
 /**
  * Returns a button that copies a text, which may take a request to get.
  * @param {string} label @param {() => string | Promise<string>} textOf
- * @param {{onCopied?: (text: string) => void, onRefused: (text: string) => void, onProblem?: (problem: any) => void}} acts
+ * @param {{onCopied?: (text: string) => void, onRefused: (text: string) => void, onProblem?: (problem: unknown) => void}} acts
  *   onRefused: the browser does not let the page copy, so the person must
  */
 export function copyButton(label, textOf, { onCopied = () => {}, onRefused, onProblem = () => {} }) {

@@ -38,7 +38,7 @@ const refuseFolder = (name) => tellInTray(name, new Problem({ title: say("drop.f
 
 let n_told = 0;
 
-/** Shows a problem in the tray. @param {string} name @param {any} problem */
+/** Shows a problem in the tray. @param {string} name @param {unknown} problem */
 function tellInTray(name, problem) {
   /** @type {import("../app/upload.js").Upload} */
   const told = { id: n_told -= 1, name, address: "", sent: 0, total: 0, state: "failed", problem, cancel: () => uploads.set(uploads.value.filter((other) => other !== told)) };

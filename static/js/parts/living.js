@@ -26,13 +26,16 @@ export async function planOf(flockId, signal) {
 }
 
 /**
- * @typedef {{node: HTMLElement, canvas: HTMLCanvasElement, player: any, atlas: any, readonly plan: import("../flock/plan.js").Plan,
- *   show: (plan: import("../flock/plan.js").Plan) => void, showSource: (source: any) => void}} Living `show` swaps to another plan
+ * @typedef {import("../flock/plan.js").Plan} Plan
+ * @typedef {import("../flock/atlas.js").Atlas} Atlas
+ * @typedef {import("../flock/appearance.js").Source} Source
+ * @typedef {{node: HTMLElement, canvas: HTMLCanvasElement, player: ReturnType<typeof createPlayer>, atlas: Atlas, readonly plan: Plan,
+ *   show: (plan: Plan) => void, showSource: (source: Source) => void}} Living `show` swaps to another plan
  */
 
 /**
  * Shows a flock in a canvas until `life` ends.
- * @param {{libraryId: string, plan: import("../flock/plan.js").Plan, life: AbortSignal, small?: boolean, pictures?: Promise<[any, ImageBitmap]>, onFrame?: (frame: number) => void, onState?: (isPlaying: boolean) => void}} options
+ * @param {{libraryId: string, plan: Plan, life: AbortSignal, small?: boolean, pictures?: Promise<[Atlas, ImageBitmap]>, onFrame?: (frame: number) => void, onState?: (isPlaying: boolean) => void}} options
  *   `small` loads the small sheet of the atlas, for little canvases and phones; `pictures` are under way already
  * @returns {Promise<Living>}
  */
@@ -40,7 +43,7 @@ export async function living({ libraryId, plan, life, small = false, pictures = 
   const canvas = element("canvas", { role: "img" });
   canvas.style.aspectRatio = plan.sizePx.join(" / ");
   const [atlas, picture] = await pictures;
-  /** @type {any} */
+  /** @type {ReturnType<typeof createPlayer> | null} */
   let player = null;
   const drawer = await createDrawer(canvas, sceneOf(plan, atlas, picture), { onResize: () => player?.redraw() });
   if (life.aborted) {
@@ -53,7 +56,7 @@ export async function living({ libraryId, plan, life, small = false, pictures = 
   tell();
   const telling = setInterval(tell, DESCRIBE_MS);
   life.addEventListener("abort", () => { clearInterval(telling); detach(); drawer.dispose(); });
-  const showSource = (/** @type {any} */ source) => player.swap(source);
+  const showSource = (/** @type {Source} */ source) => player.swap(source);
   return {
     node: element("div.living", {}, canvas), canvas, player, atlas, showSource,
     get plan() { return plan; },
@@ -68,7 +71,7 @@ export async function living({ libraryId, plan, life, small = false, pictures = 
 
 /**
  * Loads what a living flock is drawn with until `life` ends: the atlas and the background.
- * @param {string} libraryId @param {{life: AbortSignal, small?: boolean}} options @returns {Promise<[any, ImageBitmap]>}
+ * @param {string} libraryId @param {{life: AbortSignal, small?: boolean}} options @returns {Promise<[Atlas, ImageBitmap]>}
  */
 export function loadPictures(libraryId, { life, small = false }) {
   const base = `/v1/libraries/${libraryId}/`;
@@ -83,7 +86,7 @@ async function loadPicture(address, signal) {
   return createImageBitmap(await (await request("GET", address, { signal })).blob());
 }
 
-/** Returns what a frame shows as a sentence. @param {import("../flock/plan.js").Plan} plan @param {number} frame */
+/** Returns what a frame shows as a sentence. @param {Plan} plan @param {number} frame */
 async function sentence(plan, frame) {
   const { factsOf } = await import("../flock/describe.js");
   const { n, heading, isResting, nGroups } = factsOf(plan, frame);
@@ -93,6 +96,6 @@ async function sentence(plan, frame) {
 
 /** Returns the data that play mode needs. @param {string} libraryId @param {AbortSignal} life */
 export async function filmOf(libraryId, life) {
-  const [library, poses] = await Promise.all(["library", "poses"].map((name) => get(`/v1/libraries/${libraryId}/${name}.json`, life)));
+  const [library, poses] = await Promise.all([get(`/v1/libraries/${libraryId}/library.json`, life), get(`/v1/libraries/${libraryId}/poses.json`, life)]);
   return { library, poses };
 }

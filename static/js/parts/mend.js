@@ -17,11 +17,11 @@ const MENDS = {
 };
 
 /**
- * Returns the buttons for a problem. @param {any} problem @param {(params: Api.AnalysisChanges) => void} measure
+ * Returns the buttons for a problem. @param {unknown} problem @param {(params: Api.AnalysisChanges) => void} measure
  * @param {number} [length_s] length of the film: a part as long as the film mends nothing
  * @returns {import("./problem.js").Mend[]}
  */
 export function mendsOf(problem, measure, length_s = Infinity) {
-  const mends = MENDS[problem.code] ?? [];
+  const mends = MENDS[/** @type {Partial<import("../app/api.js").Problem>} */ (problem).code ?? ""] ?? [];
   return mends.filter(({ params }) => !((params.to_s ?? 0) >= length_s)).map(({ name, params }) => ({ label: say(`mend.${name}`), act: () => measure(params) }));
 }

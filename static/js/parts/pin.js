@@ -6,7 +6,7 @@ import { say, size } from "../app/words.js";
 
 /**
  * Returns a button that pins a thing or unpins it.
- * @param {{path: Api.Address<"patch">, isPinned: boolean, name: string}} thing @param {(problem: any) => void} tell
+ * @param {{path: Api.Address<"patch">, isPinned: boolean, name: string}} thing @param {(problem: unknown) => void} tell
  */
 export function pinButton({ path, isPinned, name }, tell) {
   const button = element("button.quiet.small", { type: "button", title: say("pin.help"), "aria-label": say("pin.of", { name }), "aria-pressed": isPinned, onclick: toggle }, say("pin"));

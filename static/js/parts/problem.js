@@ -6,9 +6,10 @@ import { say } from "../app/words.js";
 /** @typedef {{label: string, act: () => void, quiet?: boolean}} Mend */
 
 /**
- * Returns the box of a problem. @param {any} problem @param {Mend[]} [mends]
+ * Returns the box of a problem. @param {unknown} reason a Problem, or any error @param {Mend[]} [mends]
  */
-export function problemBox(problem, mends = []) {
+export function problemBox(reason, mends = []) {
+  const problem = /** @type {Partial<import("../app/api.js").Problem>} */ (reason);
   const title = problem.title ?? problem.message;
   const detail = problem.detail && problem.detail !== title ? sentence(problem.detail) : "";
   return element("div.problem", { role: "alert" },
@@ -23,5 +24,5 @@ export function problemBox(problem, mends = []) {
 /** Returns a cause of the service as a sentence. @param {string} text */
 const sentence = (text) => (/^ff(mpeg|probe)/.test(text) ? text : text[0].toUpperCase() + text.slice(1)) + (/[.!?。]$/.test(text) ? "" : ".");
 
-/** Replaces the content of an element by the box of a problem. @param {Element} place @param {any} problem @param {Mend[]} [mends] */
+/** Replaces the content of an element by the box of a problem. @param {Element} place @param {unknown} problem @param {Mend[]} [mends] */
 export const showProblem = (place, problem, mends) => place.replaceChildren(problemBox(problem, mends));

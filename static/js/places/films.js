@@ -33,7 +33,7 @@ export async function show(root, { life }) {
   let all = [];
   /** @type {Api.Next<"/v1/footage">} */
   let next = `/v1/footage?limit=${PAGE}`;
-  const tell = (/** @type {any} */ problem) => { if (!life.aborted) trouble.replaceChildren(problemBox(problem)); };
+  const tell = (/** @type {unknown} */ problem) => { if (!life.aborted) trouble.replaceChildren(problemBox(problem)); };
 
   /** @param {Api.Footage} film @returns {Promise<Entry>} */
   const entry = async (film) => {

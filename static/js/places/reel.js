@@ -43,7 +43,7 @@ export async function show(root, { id, query, life }) {
     return planned;
   };
   const trouble = element("div");
-  const onProblem = (/** @type {any} */ problem) => trouble.replaceChildren(problemBox(problem));
+  const onProblem = (/** @type {unknown} */ problem) => trouble.replaceChildren(problemBox(problem));
 
   // What the address holds: the moment where the flock rests, the view, and the parts of the ground truth.
   const asked = { t: query.get("t"), view: VIEWS.find((one) => one === query.get("view")) ?? "film", truth: (query.get("truth") ?? "").split(",").filter((one) => PARTS.includes(one)) };

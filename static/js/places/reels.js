@@ -36,7 +36,7 @@ export async function show(root, { query, life }) {
   let next = `/v1/flocks?limit=${PAGE}`;
   /** The loading under way: pages come one after another. @type {Promise<void>} */
   let turn = Promise.resolve();
-  const tell = (/** @type {any} */ problem) => { if (!life.aborted) trouble.replaceChildren(problemBox(problem)); };
+  const tell = (/** @type {unknown} */ problem) => { if (!life.aborted) trouble.replaceChildren(problemBox(problem)); };
 
   const wanted = () => search.value.trim().toLocaleLowerCase();
   /** Loads the next page. @param {number} limit */

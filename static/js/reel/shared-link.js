@@ -30,5 +30,5 @@ export function readLink(text) {
   const address = (/** @type {string} */ name, /** @type {string} */ expires, /** @type {string} */ signature) => `/v1/flocks/${id}/${name}?expires=${expires}&signature=${signature}`;
   const files = SHARED.map((name, k) => address(name, rest[2 * k], rest[2 * k + 1]));
   const [word, expires, signature] = rest.slice(4);
-  return { files, offered: word ? address(/** @type {any} */ (OFFERED)[word], expires, signature) : null, expires_s: Math.min(...[rest[0], rest[2], expires ?? rest[0]].map(Number)) };
+  return { files, offered: word ? address(/** @type {Record<string, string>} */ (OFFERED)[word], expires, signature) : null, expires_s: Math.min(...[rest[0], rest[2], expires ?? rest[0]].map(Number)) };
 }

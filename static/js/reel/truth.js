@@ -17,7 +17,7 @@ const SHAPE_OPACITY = 0.6;
 const FILL_MS = 200;
 
 /**
- * @param {{flock: Api.Flock, plan: () => Promise<import("../flock/plan.js").Plan>, on: string[], size: () => number[], life: AbortSignal, onChange: (on: string[]) => void, onProblem: (problem: any) => void}} options
+ * @param {{flock: Api.Flock, plan: () => Promise<import("../flock/plan.js").Plan>, on: string[], size: () => number[], life: AbortSignal, onChange: (on: string[]) => void, onProblem: (problem: unknown) => void}} options
  *   `on`: parts that are shown; `size`: width and height of the video, pixels
  */
 export function truthLayer({ flock, plan, on, size, life, onChange, onProblem }) {

@@ -12,7 +12,7 @@ export const VIEWS = ["film", "living"];
 
 /**
  * @param {{flock: Api.Flock, plan: () => Promise<import("../flock/plan.js").Plan>, size: number[], poster: string | undefined, startFrame: number | null, life: AbortSignal,
- *   onFrame: (frame: number) => void, onState: (isPlaying: boolean) => void, onProblem: (problem: any) => void}} options
+ *   onFrame: (frame: number) => void, onState: (isPlaying: boolean) => void, onProblem: (problem: unknown) => void}} options
  *   `startFrame`: the flock rests at this frame; null plays
  */
 export function createViews({ flock, plan, size, poster, startFrame, life, onFrame, onState, onProblem }) {

@@ -6,7 +6,7 @@ import { USUAL } from "./limits.js";
 
 /**
  * @typedef {import("./schema.js").Field} Field
- * @typedef {{change: (patch: any, options?: any) => void, fields: import("./schema.js").Fields}} Studio
+ * @typedef {{change: import("./settings.js").Change, fields: import("./schema.js").Fields}} Studio
  * @typedef {{node: HTMLElement, name: string, update: (value: any, state: {isSet: boolean, limits?: number[], perUnit?: number, isIdle?: boolean}) => void}} Control
  *   isSet: the value is not the preset's; limits beside the other settings; perUnit: steps of the API per shown unit
  *   (frames per second); isIdle: another setting makes it void
@@ -29,7 +29,7 @@ export function control(field, studio) {
 
 /**
  * Puts name, help and reset around an input.
- * @param {Field} field @param {Studio} studio @param {{input: any, below?: any, before?: boolean}} parts `input` stands in the line of the name
+ * @param {Field} field @param {Studio} studio @param {{input: HTMLInputElement | HTMLSelectElement | null, below?: HTMLElement, before?: boolean}} parts `input` stands in the line of the name
  */
 export function framed({ name, help }, studio, { input, below, before = false }) {
   const id = `control-${n_controls += 1}`;
@@ -84,7 +84,7 @@ function slider(field, studio) {
   const number = element("input.number", { type: "number", step: "any", inputMode: "decimal" });
   const { node, setReset } = framed(field, studio, { input: number, below: range });
   let [limits, unit, shown] = [[field.min, field.max], 1, NaN];
-  const send = (/** @type {any} */ input, /** @type {boolean} */ isFinal) => {
+  const send = (/** @type {HTMLInputElement} */ input, /** @type {boolean} */ isFinal) => {
     const asked = Number.parseFloat(input.value) * unit;
     if (!Number.isFinite(asked)) return void (isFinal && (number.value = String(shown)));
     const kept = Math.min(limits[1], Math.max(limits[0], asked));

@@ -61,7 +61,7 @@ export function factsBox() {
     update(plan) {
       node.hidden = false;
       const { facts, advice } = sentencesOf(plan);
-      const told = (plan.head.advice ?? []).map((/** @type {any} */ one) => one.sentence);
+      const told = (plan.head.advice ?? []).map(({ sentence }) => sentence);
       sentences.replaceChildren(...facts.map((text) => element("li", {}, text)));
       cards.replaceChildren(...[...advice, ...told].map((text) => element("li", {}, text)));
       const rows = Object.entries(plan.head.stats ?? {}).filter(([, value]) => typeof value === "number");

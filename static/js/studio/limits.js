@@ -38,7 +38,7 @@ export function proseLimits(name) {
   return name.endsWith("_bl") ? [0.1, 50] : [0, 20];
 }
 
-/** Returns the least and most frames beside the other settings. @param {any} params those in force @param {number} n individuals */
+/** Returns the least and most frames beside the other settings. @param {{loop?: boolean, position?: string}} params those in force @param {number} n individuals */
 export function frameLimits({ loop = false, position = "film" } = {}, n = 1) {
   const most = Math.floor(MOST_CELLS / Math.max(1, n));
   if (loop) return [LOOP_FRAMES[0], Math.min(LOOP_FRAMES[1], most)];

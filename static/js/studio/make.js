@@ -29,7 +29,7 @@ export function maker({ libraryId, settings, life, beside }) {
 
   /** @param {string} jobId @param {string} flockId */
   async function follow(jobId, flockId) {
-    /** @type {any} */
+    /** @type {ReturnType<typeof jobCard> | null} */
     let card = null;
     const place = element("div");
     state.replaceChildren(place);

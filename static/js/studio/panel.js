@@ -17,12 +17,13 @@ export function panel(studio) {
   /** @type {import("./control.js").Control[]} */
   const controls = [];
   const put = (/** @type {import("./control.js").Control} */ one) => { controls.push(one); return one.node; };
-  const field = (/** @type {string} */ name) => /** @type {any} */ (fields.get(name));
+  const field = (/** @type {string} */ name) => /** @type {import("./schema.js").Field} */ (fields.get(name));
   const plain = (/** @type {string[]} */ list) => list.map((name) => put(name === "seed" ? seed(field(name), studio) : control(field(name), studio)));
-  const own = (/** @type {string} */ name, /** @type {any} */ make, /** @type {any} */ more) => (fields.has(name) ? [put(make(field(name), studio, more))] : []);
+  /** @template T @param {string} name @param {(field: import("./schema.js").Field, studio: import("./control.js").Studio, more: T) => import("./control.js").Control} make @param {T} more */
+  const own = (name, make, more) => (fields.has(name) ? [put(make(field(name), studio, more))] : []);
   /** @type {{node: HTMLElement, mark: HTMLElement}[]} */
   const groups = [];
-  const group = (/** @type {string} */ name, /** @type {any[]} */ ...children) => {
+  const group = (/** @type {string} */ name, /** @type {Page.Child[]} */ ...children) => {
     const mark = element("span.mark");
     const node = element(`details.group#group-${name}`, {}, element("summary", {}, say(`group.${name}`), " ", mark), ...children);
     groups.push({ node, mark });

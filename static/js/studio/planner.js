@@ -17,24 +17,26 @@ const BUSY_MS = 700;
 /** Individuals where `count` is not set and no plan has told their number. */
 const USUAL_COUNT = 20;
 
+/** @typedef {import("../flock/plan.js").Plan} Plan @typedef {import("./settings.js").Settings} Settings */
+
 /**
- * @param {{libraryId: string, life: AbortSignal, onPlan: (plan: import("../flock/plan.js").Plan, settings: any) => void, onBusy: (isBusy: boolean) => void,
- *   onProblem: (problem: any) => void}} options
+ * @param {{libraryId: string, life: AbortSignal, onPlan: (plan: Plan, settings: Settings) => void, onBusy: (isBusy: boolean) => void,
+ *   onProblem: (problem: unknown) => void}} options
  */
 export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
-  /** @type {Map<string, any>} */
+  /** @type {Map<string, Plan>} */
   const kept = new Map();
-  /** @type {any} */
+  /** @type {Settings | null} */
   let wanted = null;
   /** @type {AbortController | null} */
   let running = null;
   let [timer, since, filled, pinned, planning] = [0, 0, USUAL_COUNT, "", ""];
-  /** The plan that is shown, as it came. @type {{plan: import("../flock/plan.js").Plan, settings: any} | null} */
+  /** The plan that is shown, as it came. @type {{plan: Plan, settings: Settings} | null} */
   let shown = null;
-  /** The settings of the newest request. @type {any} */
-  let newest = null;
+  /** The settings of the newest request. @type {Settings} */
+  let newest = {};
 
-  /** @param {import("../flock/plan.js").Plan} plan @param {any} settings */
+  /** @param {Plan} plan @param {Settings} settings */
   function tell(plan, settings) {
     shown = { plan, settings };
     onPlan(dressed(plan, settings), settings);
@@ -42,7 +44,7 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
 
   /**
    * Asks for the plan of some settings; the former request is given up.
-   * @param {any} settings @param {any} [before] settings whose plan is kept, for comparing
+   * @param {Settings} settings @param {Settings} [before] settings whose plan is kept, for comparing
    */
   function ask(settings, before) {
     clearTimeout(timer);
@@ -61,7 +63,7 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
     return undefined;
   }
 
-  /** @param {import("../flock/plan.js").Plan} plan @param {any} settings */
+  /** @param {Plan} plan @param {Settings} settings */
   function finish(plan, settings) {
     running?.abort();
     running = wanted = null;
@@ -71,7 +73,7 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
 
   async function start() {
     running?.abort();
-    const settings = wanted;
+    const settings = wanted ?? {};
     const mine = running = new AbortController();
     wanted = null;
     planning = keyOf(settings);
@@ -97,7 +99,7 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
     }
   }
 
-  /** @param {any} settings @param {AbortSignal} signal @param {(plan: import("../flock/plan.js").Plan) => void} onFirst */
+  /** @param {Settings} settings @param {AbortSignal} signal @param {(plan: Plan) => void} onFirst */
   async function planOf(settings, signal, onFirst) {
     const body = bodyOf(ofPlan(settings));
     const n = body.count ?? filled;
@@ -114,7 +116,7 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
     return Object.assign(plan, { isPart: frames > most });
   }
 
-  /** @param {any} settings @param {import("../flock/plan.js").Plan} plan */
+  /** @param {Settings} settings @param {Plan} plan */
   function keep(settings, plan) {
     kept.delete(keyOf(settings));
     kept.set(keyOf(settings), plan);
@@ -124,7 +126,7 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
   life.addEventListener("abort", () => clearTimeout(timer));
   return {
     ask,
-    /** Returns the plan of some settings if it is kept. @param {any} settings */
+    /** Returns the plan of some settings if it is kept. @param {Settings} settings */
     kept(settings) {
       const plan = kept.get(keyOf(settings));
       return plan && dressed(plan, settings);
@@ -132,15 +134,15 @@ export function createPlanner({ libraryId, life, onPlan, onBusy, onProblem }) {
   };
 }
 
-/** Settings of the drawing, and those that decide the plan. @param {any} settings */
+/** Settings of the drawing, and those that decide the plan. @param {Settings} settings */
 const ofDrawing = (settings) => Object.fromEntries(Object.entries(settings).filter(([name]) => name.startsWith("render.")));
-/** @param {any} settings */
+/** @param {Settings} settings */
 const ofPlan = (settings) => Object.fromEntries(Object.entries(settings).filter(([name]) => !name.startsWith("render.")));
 
-/** @param {any} settings */
+/** @param {Settings} settings */
 const keyOf = (settings) => writeQuery(ofPlan(settings));
 
-/** Returns a plan that is drawn as the settings say. @param {import("../flock/plan.js").Plan} plan @param {any} settings */
+/** Returns a plan that is drawn as the settings say. @param {Plan} plan @param {Settings} settings */
 function dressed(plan, settings) {
   const { params } = plan.head;
   return { ...plan, head: { ...plan.head, params: { ...params, render: { ...params.render, ...bodyOf(settings).render } } } };

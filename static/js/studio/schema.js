@@ -2,17 +2,19 @@
 // @ts-check
 import { get } from "../app/api.js";
 import { proseLimits } from "./limits.js";
+import { at } from "./settings.js";
 
 /**
  * @typedef {{name: string, kind: "number" | "whole" | "boolean" | "choice" | "group" | "other", min: number, max: number,
  *   step: number, choices: string[], default: any, nullable: boolean, help: string}} Field
+ * @typedef {Api.JsonSchema} Schema
  * @typedef {Map<string, Field>} Fields by name, with dots between levels
  */
 
 /** Presets of a service that does not list them. */
 const PRESETS = ["school", "swarm", "mill", "scatter", "zonal", "papers"];
 
-/** @type {Promise<Record<string, any>> | null} */
+/** @type {Promise<Record<string, Schema>> | null} */
 let known = null;
 
 /** Returns the schemas of the service, which is asked once. */
@@ -25,69 +27,72 @@ function load() {
 /** Returns the fields of a flock, or of a virtual fish. @param {"Flock" | "Fish"} [kind] @returns {Promise<Fields>} */
 export const loadFields = async (kind = "Flock") => fieldsOf(await load(), `${kind}Params`, `${kind}Request`);
 
-/** Returns the defaults of the parameters of an analysis by name. @returns {Promise<Record<string, any>>} */
+/** Returns the defaults of the parameters of an analysis by name. @returns {Promise<Api.AnalysisParams>} */
 export const analysisDefaults = async () => defaultsOf((await load()).AnalysisParams);
 
-/** @param {any} schema */
+/** @param {Schema | undefined} schema */
 const defaultsOf = (schema) => Object.fromEntries(Object.entries(schema?.properties ?? {}).map(([name, property]) => [name, property.default ?? null]));
 
-/** @param {Record<string, any>} schemas @param {string} params name of the schema of the settings @param {string} request the one that has the presets @returns {Fields} */
+/** @param {Record<string, Schema>} schemas @param {string} params name of the schema of the settings @param {string} request the one that has the presets @returns {Fields} */
 function fieldsOf(schemas, params, request) {
   /** @type {Fields} */
   const fields = new Map();
-  const collect = (/** @type {any} */ schema, /** @type {string} */ prefix, /** @type {any} */ defaults) => {
+  const collect = (/** @type {Schema} */ schema, /** @type {string} */ prefix, /** @type {unknown} */ defaults) => {
     for (const [key, property] of Object.entries(schema.properties ?? {})) {
       const name = prefix + key;
       const { type, nullable } = plain(property, schemas);
-      const own = property.default ?? defaults?.[key] ?? null;
+      const own = property.default ?? at(defaults, key) ?? null;
       const isGroup = type.type === "object" && name !== "predator";
       const field = fieldOf(name, { ...type, description: property.description ?? type.description }, own, nullable);
-      if (type.items) field.choices = plain(type.items, schemas).type.enum ?? [];
+      if (type.items) field.choices = choicesOf(plain(type.items, schemas).type.enum);
       fields.set(name, isGroup ? { ...field, kind: "group" } : field);
       if (isGroup) collect(type, `${name}.`, own);
     }
   };
   collect(schemas[params], "", null);
   const preset = schemas[request]?.properties?.preset ?? {};
-  const choices = (preset.enum ?? PRESETS).filter(Boolean);
+  const choices = choicesOf(preset.enum ?? PRESETS);
   fields.set("preset", { ...fieldOf("preset", { ...preset, type: "string" }, null, true), kind: "choice", choices });
   return fields;
 }
 
-/** Follows references and takes null away. @param {any} schema @param {Record<string, any>} schemas */
+/** Follows references and takes null away. @param {Schema} schema @param {Record<string, Schema>} schemas */
 function plain(schema, schemas) {
   let nullable = false;
   let type = schema;
   for (let depth = 0; depth < 8; depth++) {
     const list = type.oneOf ?? type.anyOf;
-    if (type.$ref) type = { ...schemas[type.$ref.split("/").at(-1)] };
-    else if (list?.some((/** @type {any} */ one) => one.type === "null")) {
+    if (type.$ref) type = { ...schemas[type.$ref.split("/").at(-1) ?? ""] };
+    else if (list?.some((one) => one.type === "null")) {
       nullable = true;
-      type = list.find((/** @type {any} */ one) => one.type !== "null");
+      type = list.find((one) => one.type !== "null") ?? {};
     } else if (type.allOf?.length === 1) [type] = type.allOf;
     else break;
   }
   if (Array.isArray(type.type)) {
     nullable ||= type.type.includes("null");
-    type = { ...type, type: type.type.find((/** @type {string} */ one) => one !== "null") };
+    type = { ...type, type: type.type.find((one) => one !== "null") };
   }
   return { type, nullable };
 }
 
-/** @param {string} name @param {any} type @param {any} value its default @param {boolean} nullable @returns {Field} */
+/** @param {string} name @param {Schema} type @param {unknown} value its default @param {boolean} nullable @returns {Field} */
 function fieldOf(name, type, value, nullable) {
   const [min, max] = limitsOf(name, type);
   const isNumber = type.type === "number" || type.type === "integer";
   const kind = type.type === "integer" ? "whole" : isNumber ? "number" : type.type === "boolean" ? "boolean" : type.enum ? "choice" : "other";
   const step = type.multipleOf ?? (name === "fade_frames" ? 2 : kind === "whole" ? 1 : max <= 1 ? 0.01 : 0.05);
-  return { name, kind, min, max, step, choices: (type.enum ?? []).filter(Boolean), default: value, nullable, help: tidy(type.description) };
+  return { name, kind, min, max, step, choices: choicesOf(type.enum), default: value, nullable, help: tidy(type.description) };
 }
 
-/** @param {string} name @param {any} type */
+/** Returns the choices of an enumeration; null is none. @param {(string | null)[]} [all] */
+const choicesOf = (all = []) => all.flatMap((one) => one || []);
+
+/** @param {string} name @param {Schema} type */
 function limitsOf(name, type) {
   const min = type.minimum ?? type.exclusiveMinimum;
   const max = type.maximum ?? type.exclusiveMaximum;
-  if (Number.isFinite(min) && Number.isFinite(max)) return [min, max];
+  if (min !== undefined && max !== undefined) return [min, max];
   if (name === "seed") return [0, Number.MAX_SAFE_INTEGER];
   return proseLimits(name);
 }

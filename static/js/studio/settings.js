@@ -2,7 +2,10 @@
 // @ts-check
 import { signal } from "../app/store.js";
 
-/** @typedef {Record<string, any>} Settings by the names of the API with dots; only those that differ from the preset */
+/**
+ * @typedef {Record<string, any>} Settings by the names of the API with dots; only those that differ from the preset
+ * @typedef {(patch: Settings, options?: {step?: string, isGesture?: boolean}) => void} Change
+ */
 
 /** Names in the address that are no settings. */
 const OTHERS = ["t", "lang"];
@@ -18,7 +21,7 @@ export function readQuery(query, fields) {
   const settings = {};
   /** @type {string[]} */
   const unknown = [];
-  const put = (/** @type {string} */ name, /** @type {any} */ value) => {
+  const put = (/** @type {string} */ name, /** @type {unknown} */ value) => {
     const field = fields.get(name);
     if (!field) unknown.push(name);
     else if (field.kind === "group" && value && typeof value === "object" && Object.keys(value).length) {
@@ -38,13 +41,13 @@ function valueOf(text) {
   }
 }
 
-/** Returns a value as it stands in the query and after `--set`: bare words where JSON allows it. @param {any} value */
+/** Returns a value as it stands in the query and after `--set`: bare words where JSON allows it. @param {unknown} value */
 export const textOf = (value) => (typeof value === "string" && valueOf(value) === value ? value : JSON.stringify(value));
 
 /** @param {Settings} settings */
 export const writeQuery = (settings) => new URLSearchParams(Object.entries(settings).map(([name, value]) => [name, textOf(value)])).toString();
 
-/** Returns the settings as the body of a request. @param {Settings} settings */
+/** Returns the settings as the body of a request. @param {Settings} settings @returns {Api.FlockChanges} */
 export function bodyOf(settings) {
   /** @type {any} */
   const body = {};
@@ -59,7 +62,7 @@ export function bodyOf(settings) {
   return body;
 }
 
-/** Returns a parameter by its name. @param {any} params @param {string} name */
+/** Returns a parameter by its name. @param {any} params of any shape @param {string} name */
 export const at = (params, name) => name.split(".").reduce((value, key) => value?.[key], params);
 
 /**

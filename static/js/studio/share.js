@@ -11,7 +11,7 @@ import { waysOf } from "./ways.js";
 export function share(library) {
   /** What is shown now. @type {{settings: import("./settings.js").Settings, link: string} | null} */
   let shown = null;
-  /** @type {any} */
+  /** @type {Api.AnalysisParams | undefined} */
   let defaults;
   analysisDefaults().then((known) => { defaults = known; if (shown) update(shown.settings, shown.link); }).catch(() => {});
   const rows = ["link", "curl", "command", "python"].map((name) => {

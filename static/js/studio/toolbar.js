@@ -3,7 +3,7 @@
 import { element, svg } from "../app/element.js";
 import { say } from "../app/words.js";
 
-/** Paths of the icons, in a box of 24. */
+/** Paths of the icons, in a box of 24. @type {Record<string, string>} */
 const ICONS = {
   chase: "M5 3l14 8-6 1.5L10 19z",
   goal: "M12 2v5m0 10v5M2 12h5m10 0h5M12 7a5 5 0 1 0 0 10a5 5 0 1 0 0-10",
@@ -15,16 +15,16 @@ const ICONS = {
 const TOOLS = ["goal", "circle", "box"];
 
 /** @param {string} name */
-const icon = (name) => svg("svg", { viewBox: "0 0 24 24", "aria-hidden": "true", class: "tool-icon" }, svg("path", { d: /** @type {any} */ (ICONS)[name] }));
+const icon = (name) => svg("svg", { viewBox: "0 0 24 24", "aria-hidden": "true", class: "tool-icon" }, svg("path", { d: ICONS[name] }));
 
 /**
  * Returns buttons that take a tool and put it back.
- * @param {string[]} names @param {{tool: import("../app/store.js").Signal<string>, life: AbortSignal, add: (kind: any) => void}} options
+ * @param {string[]} names @param {{tool: import("../app/store.js").Signal<string>, life: AbortSignal, add: (kind: import("./things.js").Kind) => void}} options
  *   `add` puts a thing in the middle, for the keyboard
  */
 export function toolButtons(names, { tool, life, add }) {
   const choose = (/** @type {string} */ name, /** @type {boolean} */ byKey) => {
-    if (byKey && name !== "chase") add(name);
+    if (byKey && name !== "chase") add(/** @type {import("./things.js").Kind} */ (name));
     else tool.set(tool.value === name ? "" : name);
   };
   return names.map((name) => {
@@ -36,7 +36,7 @@ export function toolButtons(names, { tool, life, add }) {
 }
 
 /**
- * @param {{tool: import("../app/store.js").Signal<string>, life: AbortSignal, add: (kind: any) => void, undo: () => void, redo: () => void,
+ * @param {{tool: import("../app/store.js").Signal<string>, life: AbortSignal, add: (kind: import("./things.js").Kind) => void, undo: () => void, redo: () => void,
  *   compare: (isOn: boolean) => void}} options
  */
 export function toolbar({ tool, life, add, undo, redo, compare }) {

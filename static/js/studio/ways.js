@@ -1,10 +1,10 @@
 // The same flock by other means: the lines for curl, for the command line and for Python, each complete enough to run.
 // @ts-check
-import { bodyOf, textOf } from "./settings.js";
+import { at, bodyOf, textOf } from "./settings.js";
 
 /**
- * @typedef {{id: string, footage_id?: string, params?: any}} Library
- * @typedef {{link: string, origin: string, needsToken?: boolean, defaults?: any}} Place
+ * @typedef {{id: string, footage_id?: string, params?: Api.AnalysisParams}} Library
+ * @typedef {{link: string, origin: string, needsToken?: boolean, defaults?: Api.AnalysisParams}} Place
  *   `needsToken`: the service asks for a token; `defaults` of the parameters of an analysis
  */
 
@@ -16,7 +16,7 @@ const NOT_SET = ["preset", "render.formats", "render.overlay", "render.ground_tr
 /** Quotes an argument of a shell where it needs quotes. @param {string} text */
 const quoted = (text) => (/^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
 
-/** @param {[string, any]} parameter */
+/** @param {[string, unknown]} parameter */
 const setting = ([name, value]) => `--set ${quoted(`${name}=${textOf(value)}`)}`;
 
 /** Returns the ways to make a flock. @param {Library} library @param {import("./settings.js").Settings} settings @param {Place} place */
@@ -35,7 +35,7 @@ export function waysOf(library, settings, place) {
 /** Returns the commands that write the library; without its film, it must be there. @param {Library} library @param {Place} place */
 function libraryCommands({ footage_id, params = {} }, { origin, needsToken, defaults = {} }) {
   if (!footage_id) return [];
-  const changed = Object.entries(params).filter(([name, value]) => JSON.stringify(value) !== JSON.stringify(defaults[name] ?? null));
+  const changed = Object.entries(params).filter(([name, value]) => JSON.stringify(value) !== JSON.stringify(at(defaults, name) ?? null));
   const token = needsToken ? ` -H "Authorization: Bearer $FLOCKREEL_TOKEN"` : "";
   return [`curl${token} -o film ${origin}/v1/footage/${footage_id}/file`, ["flockreel analyze film -o library", ...changed.map(setting)].join(" \\\n  ")];
 }
