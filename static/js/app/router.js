@@ -6,7 +6,8 @@ import { showProblem } from "../parts/problem.js";
 import { say } from "./words.js";
 
 /**
- * @typedef {{id: string, query: URLSearchParams, life: AbortSignal, state: any}} Visit id of the address, its
+ * @typedef {{job?: string, isKnown?: boolean}} Given the job that measures a film; or that it was measured before
+ * @typedef {{id: string, query: URLSearchParams, life: AbortSignal, state?: Given}} Visit id of the address, its
  *   query, and a signal that is aborted when the person leaves the place
  * @typedef {{show: (root: HTMLElement, visit: Visit) => Promise<void> | void}} Place
  */
@@ -62,7 +63,7 @@ function isInside(link, event) {
 /** @param {string} path */
 const routeOf = (path) => ROUTES.find(({ pattern }) => pattern.test(path));
 
-/** Goes to an address of the page. @param {string} address @param {any} [state] handed to the place */
+/** Goes to an address of the page. @param {string} address @param {Given} [state] handed to the place */
 export function go(address, state) {
   history.replaceState({ ...history.state, scroll: scrollY }, "");
   history.pushState({ given: state }, "", address);

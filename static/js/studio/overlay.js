@@ -10,8 +10,10 @@ const [STEP, FAR] = [1, 10];
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 /**
+ * @typedef {import("./things.js").Slot} Slot
+ * @typedef {{step: string, from: number[], line: number[][], draw?: Slot, thing?: import("./things.js").Thing, handle?: string | null}} Gesture line: way of the pointer
  * @param {{canvas: {focus: (options?: FocusOptions) => void}, size: number[], life: AbortSignal, tool: import("../app/store.js").Signal<string>,
- *   placed: () => import("./things.js").Placed, length_s: () => number, change: (patch: any, options?: any) => void,
+ *   placed: () => import("./things.js").Placed, length_s: () => number, change: import("./settings.js").Change,
  *   onSelect: (key: string) => void}} options `size` of the film, pixels
  */
 export function overlay({ canvas, size, life, tool, placed, length_s, change, onSelect }) {
@@ -21,7 +23,7 @@ export function overlay({ canvas, size, life, tool, placed, length_s, change, on
   /** @type {Map<string, ReturnType<typeof shapeOf>>} */
   const shapes = new Map();
   let [selected, n_gestures] = ["", 0];
-  /** @type {any} */
+  /** @type {Gesture | null} */
   let gesture = null;
 
   const unit = () => 1 / (layer.getScreenCTM()?.a || 1);
@@ -51,7 +53,7 @@ export function overlay({ canvas, size, life, tool, placed, length_s, change, on
     if (focus) shapes.get(key)?.group.focus({ preventScroll: true });
   }
 
-  /** @param {any} thing @param {any} value @param {string} [step] */
+  /** @param {Slot} thing @param {import("./things.js").Thing["value"] | undefined} value @param {string} [step] */
   const put = (thing, value, step) => change(withThing(placed(), thing, value), step ? { step, isGesture: true } : { step: `${thing.key}` });
 
   /** Adds a thing in the middle, for the keyboard. @param {import("./things.js").Kind} kind */
@@ -80,13 +82,13 @@ export function overlay({ canvas, size, life, tool, placed, length_s, change, on
     const key = target.closest(".thing")?.getAttribute("data-key");
     const at = pointOf(event);
     const step = `gesture-${n_gestures += 1}`;
-    const drawing = ["goal", "circle", "box", "predator"].includes(tool.value);
+    const drawing = /** @type {const} */ (["goal", "circle", "box", "predator"]).find((kind) => kind === tool.value);
     if (!drawing && !key) return select("");
     event.preventDefault();
     layer.setPointerCapture(event.pointerId);
-    if (drawing) gesture = { step, from: at, line: [at], draw: { kind: tool.value, index: nextIndex(tool.value), key: `${tool.value}-${nextIndex(tool.value)}` } };
+    if (drawing) gesture = { step, from: at, line: [at], draw: { kind: drawing, index: nextIndex(drawing), key: `${drawing}-${nextIndex(drawing)}` } };
     else {
-      gesture = { step, from: at, thing: find(key ?? ""), handle: target.closest(".handle")?.getAttribute("data-handle") };
+      gesture = { step, from: at, line: [], thing: find(key ?? ""), handle: target.closest(".handle")?.getAttribute("data-handle") };
       select(key ?? "", { focus: true });
     }
     return undefined;
@@ -98,7 +100,7 @@ export function overlay({ canvas, size, life, tool, placed, length_s, change, on
     const { thing, handle, from, step, line } = gesture;
     if (gesture.draw?.kind === "predator") { line.push(at); sketch.setAttribute("points", line.map(String).join(" ")); }
     else if (gesture.draw) put(gesture.draw, drawn(gesture.draw.kind, from, at, size), step);
-    else put(thing, handle == null ? moved(thing, [at[0] - from[0], at[1] - from[1]], size) : sized(thing, Number(handle), at, size), step);
+    else if (thing) put(thing, handle == null ? moved(thing, [at[0] - from[0], at[1] - from[1]], size) : sized(thing, Number(handle), at, size), step);
   }, { signal: life });
 
   const finish = (/** @type {PointerEvent} */ event) => {
@@ -136,9 +138,9 @@ export function overlay({ canvas, size, life, tool, placed, length_s, change, on
   life.addEventListener("abort", () => observer.disconnect());
   return {
     node: layer, draw, add, remove, select,
-    /** Marks the predator of a plan. @param {import("../flock/plan.js").Plan} plan @param {number} frame */
+    /** Marks the predator of a plan. @param {import("../flock/plan.js").Plan | null} plan @param {number} frame */
     mark(plan, frame) {
-      const at = plan.head.predator?.[frame % plan.nFrames];
+      const at = plan?.head.predator?.[frame % plan.nFrames];
       hunter.toggleAttribute("hidden", !at);
       if (at) for (const circle of hunter.children) { circle.setAttribute("cx", String(at[0])); circle.setAttribute("cy", String(at[1])); }
     },

@@ -11,7 +11,7 @@ const [GRASP, HANDLE, GOAL] = [22, 6, 13];
 
 /** Returns what a thing is called. @param {Thing} thing */
 export function titleOf({ kind, index, value }) {
-  const at = value.at_px ?? value.circle?.center_px ?? value.box?.box_px ?? [];
+  const at = "at_px" in value ? value.at_px : "circle" in value ? value.circle.center_px : "box" in value ? value.box.box_px : [];
   return say(`thing.${kind}.name`, { n: index + 1, x: String(Math.round(at[0])), y: String(Math.round(at[1])) });
 }
 
@@ -49,7 +49,7 @@ const tagOf = (kind) => ({ goal: "circle", circle: "circle", box: "rect", predat
 function attributesOf({ kind, value }, unit) {
   if (kind === "goal") return { cx: value.at_px[0], cy: value.at_px[1], r: GOAL * unit };
   if (kind === "circle") return { cx: value.circle.center_px[0], cy: value.circle.center_px[1], r: value.circle.radius_px };
-  if (kind === "predator") return { points: value.path.map((/** @type {any} */ one) => one.at_px.join()).join(" ") };
+  if (kind === "predator") return { points: (value.path ?? []).map((one) => one.at_px.join()).join(" ") };
   const [x, y, width, height] = value.box.box_px;
   return { x, y, width, height };
 }

@@ -4,11 +4,12 @@
 import { element } from "../app/element.js";
 import { say } from "../app/words.js";
 import { radio } from "./own-controls.js";
+import { at } from "./settings.js";
 import { titleOf } from "./shapes.js";
 import { thingsOf, withThing } from "./things.js";
 import { toolButtons } from "./toolbar.js";
 
-/** Settings of things: name, least, most, step. */
+/** Settings of things: name, least, most, step. @type {Record<import("./things.js").Kind, [string, number, number, number][]>} */
 const KNOBS = { goal: [["from_s", 0, 1e5, 0.1], ["until_s", 0, 1e5, 0.1], ["weight", 0, 20, 0.1]], predator: [["flee_bl", 0.1, 50, 0.1]], circle: [], box: [] };
 
 /** What they may flee from, and the tools that make the path of a predator. */
@@ -16,8 +17,8 @@ const FLEE = ["nothing", "hunter", "path"];
 const PATH_TOOLS = ["predator", "chase"];
 
 /**
- * @param {{node: HTMLElement, life: AbortSignal, placed: () => import("./things.js").Placed, change: (patch: any, options?: any) => void,
- *   layer: any, tool: import("../app/store.js").Signal<string>}} options
+ * @param {{node: HTMLElement, life: AbortSignal, placed: () => import("./things.js").Placed, change: import("./settings.js").Change,
+ *   layer: ReturnType<typeof import("./overlay.js").overlay>, tool: import("../app/store.js").Signal<string>}} options
  */
 export function thingsList({ node, life, placed, change, layer, tool }) {
   const choices = FLEE.map((one) => radio("flee", one, say(`flee.${one}`), () => choose(one)));
@@ -54,25 +55,25 @@ export function thingsList({ node, life, placed, change, layer, tool }) {
         element("button.small-button", { type: "button", "aria-label": say("thing.remove", { name: titleOf(thing) }), title: say("thing.remove", { name: titleOf(thing) }), onclick: () => layer.remove(thing.key) }, "✕"))));
     }
     for (const row of list.children) row.classList.toggle("selected", /** @type {HTMLElement} */ (row).dataset.key === selected);
-    drawKnobs(things.find(({ key }) => key === selected) ?? (value === "hunter" ? { key: "predator-0", kind: "predator", index: 0, value: predator } : undefined));
+    drawKnobs(things.find(({ key }) => key === selected) ?? (predator && value === "hunter" ? { key: "predator-0", kind: "predator", index: 0, value: predator } : undefined));
   }
 
-  /** @param {any} thing */
+  /** @param {import("./things.js").Thing | undefined} thing */
   function drawKnobs(thing) {
-    const names = thing ? /** @type {any} */ (KNOBS)[thing.kind] : [];
+    const names = thing ? KNOBS[thing.kind] : [];
     if ((thing?.key ?? "") !== shown) {
       shown = thing?.key ?? "";
-      knobs.replaceChildren(...names.map((/** @type {any[]} */ [name, min, max, step]) => {
+      knobs.replaceChildren(...names.map(([name, min, max, step]) => {
         const input = element("input.number", { type: "number", min, max, step: "any", placeholder: say(`thing.${name}.none`), oninput: () => {
-          const now = thingsOf(placed()).find(({ key }) => key === shown) ?? { ...thing, value: placed().predator };
-          const { [name]: _, ...rest } = now.value;
-          if (input.validity.valid) change(withThing(placed(), now, input.value === "" ? rest : { ...rest, [name]: Number(input.value) }), { step: `${shown} ${name}` });
+          const now = thingsOf(placed()).find(({ key }) => key === shown)?.value ?? placed().predator;
+          const next = { ...now, [name]: input.value === "" ? undefined : Number(input.value) };
+          if (thing && input.validity.valid) change(withThing(placed(), thing, next), { step: `${shown} ${name}` });
         } });
         input.dataset.name = name;
         return element("label.control-line", {}, element("span", {}, say(`thing.${name}`)), input);
       }));
     }
-    for (const input of knobs.querySelectorAll("input")) if (document.activeElement !== input) input.value = thing.value[/** @type {string} */ (input.dataset.name)] ?? "";
+    for (const input of knobs.querySelectorAll("input")) if (document.activeElement !== input) input.value = at(thing?.value, input.dataset.name ?? "") ?? "";
   }
 
   return { draw, select(/** @type {string} */ key) { selected = key; draw(); } };

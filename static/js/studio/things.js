@@ -3,8 +3,12 @@
 
 /**
  * @typedef {"goal" | "circle" | "box" | "predator"} Kind
- * @typedef {{key: string, kind: Kind, index: number, value: any}} Thing `value` as in the API
- * @typedef {{goals: any[], obstacles: any[], predator: any}} Placed
+ * @typedef {Extract<Api.Schemas["Obstacle"], {circle: unknown}>} Circle
+ * @typedef {Extract<Api.Schemas["Obstacle"], {box: unknown}>} Box
+ * @typedef {{kind: "goal", value: Api.Goal} | {kind: "circle", value: Circle} | {kind: "box", value: Box} | {kind: "predator", value: Api.Predator}} Shape
+ * @typedef {Shape & {key: string, index: number}} Thing `value` as in the API
+ * @typedef {Pick<Thing, "key" | "kind" | "index">} Slot what a thing is called, also before it has a value
+ * @typedef {{goals: Api.Goal[], obstacles: (Circle | Box)[], predator: Api.Predator | null}} Placed
  * @typedef {number[]} Point pixels of the film
  */
 
@@ -17,16 +21,17 @@ const LEAST_PX = 4;
 
 /** @param {Placed} placed @returns {Thing[]} */
 export function thingsOf({ goals, obstacles, predator }) {
+  /** @type {(Shape & {index: number})[]} */
   const all = [
-    ...goals.map((value, index) => ({ kind: /** @type {Kind} */ ("goal"), index, value })),
-    ...obstacles.map((value, index) => ({ kind: /** @type {Kind} */ (value.circle ? "circle" : "box"), index, value })),
+    ...goals.map((value, index) => ({ kind: /** @type {const} */ ("goal"), index, value })),
+    ...obstacles.map((value, index) => ("circle" in value ? { kind: /** @type {const} */ ("circle"), index, value } : { kind: /** @type {const} */ ("box"), index, value })),
   ];
   if (predator?.path?.length) all.push({ kind: "predator", index: 0, value: predator });
   return all.map((one) => ({ ...one, key: `${one.kind}-${one.index}` }));
 }
 
 /** Returns the settings with a thing in place of that of the same kind and index; without one, it is taken away.
- * @param {Placed} placed @param {{kind: Kind, index: number}} thing @param {any} [value] */
+ * @param {Placed} placed @param {Pick<Slot, "kind" | "index">} thing @param {Thing["value"]} [value] */
 export function withThing({ goals, obstacles }, { kind, index }, value) {
   if (kind === "predator") return { predator: value };
   const list = kind === "goal" ? goals : obstacles;
@@ -51,7 +56,7 @@ export function moved({ kind, value }, [dx, dy], size) {
   const shift = (/** @type {Point} */ [x, y]) => inside([x + dx, y + dy], size);
   if (kind === "goal") return { ...value, at_px: shift(value.at_px) };
   if (kind === "circle") return { circle: { ...value.circle, center_px: shift(value.circle.center_px) } };
-  if (kind === "predator") return { ...value, path: value.path.map((/** @type {any} */ one) => ({ ...one, at_px: isInside(one.at_px, size) ? shift(one.at_px) : one.at_px })) };
+  if (kind === "predator") return { ...value, path: (value.path ?? []).map((one) => ({ ...one, at_px: isInside(one.at_px, size) ? shift(one.at_px) : one.at_px })) };
   const [x, y, w, h] = value.box.box_px;
   return { box: { box_px: whole([Math.min(size[0] - 1, Math.max(1 - w, x + dx)), Math.min(size[1] - 1, Math.max(1 - h, y + dy)), w, h]) } };
 }
@@ -59,7 +64,7 @@ export function moved({ kind, value }, [dx, dy], size) {
 /** Points at which a thing is sized or bent. @param {Thing} thing @returns {Point[]} */
 export function handlesOf({ kind, value }) {
   if (kind === "circle") return [[value.circle.center_px[0] + value.circle.radius_px, value.circle.center_px[1]]];
-  if (kind === "predator") return value.path.map((/** @type {any} */ one) => one.at_px);
+  if (kind === "predator") return (value.path ?? []).map((one) => one.at_px);
   if (kind !== "box") return [];
   const [x, y, w, h] = value.box.box_px;
   return [[x, y], [x + w, y + h]];
@@ -68,7 +73,8 @@ export function handlesOf({ kind, value }) {
 /** Returns the value of a thing whose handle is at another point. @param {Thing} thing @param {number} handle @param {Point} to @param {Point} size */
 export function sized({ kind, value }, handle, to, size) {
   if (kind === "circle") return { circle: { ...value.circle, radius_px: Math.max(LEAST_PX, Math.round(Math.hypot(to[0] - value.circle.center_px[0], to[1] - value.circle.center_px[1]))) } };
-  if (kind === "predator") return { ...value, path: value.path.map((/** @type {any} */ one, /** @type {number} */ k) => (k === handle ? { ...one, at_px: inside(to, size) } : one)) };
+  if (kind === "predator") return { ...value, path: (value.path ?? []).map((one, k) => (k === handle ? { ...one, at_px: inside(to, size) } : one)) };
+  if (kind === "goal") return value;
   const [x, y, w, h] = value.box.box_px;
   const [left, top, right, bottom] = handle ? [x, y, Math.max(x + LEAST_PX, to[0]), Math.max(y + LEAST_PX, to[1])] : [Math.min(to[0], x + w - LEAST_PX), Math.min(to[1], y + h - LEAST_PX), x + w, y + h];
   return { box: { box_px: whole([left, top, right - left, bottom - top]) } };
@@ -107,8 +113,8 @@ const waypoint = (time_s, at_px) => ({ time_s: Number(time_s.toFixed(2)), at_px 
 /** Returns a point far outside the picture, beyond the border that is nearest. @param {Point} point @param {Point} size @returns {Point} */
 function outside([x, y], [width, height]) {
   const far = Math.max(width, height);
-  const ways = [[x, [-far, y]], [width - x, [width + far, y]], [y, [x, -far]], [height - y, [x, height + far]]];
-  return /** @type {any} */ (ways.sort(([a], [b]) => Number(a) - Number(b))[0][1]);
+  const ways = [{ gap: x, to: [-far, y] }, { gap: width - x, to: [width + far, y] }, { gap: y, to: [x, -far] }, { gap: height - y, to: [x, height + far] }];
+  return ways.sort((a, b) => a.gap - b.gap)[0].to;
 }
 
 /** Drops the points that matter least until few enough are left (Ramer, Douglas and Peucker). @param {Point[]} points */
