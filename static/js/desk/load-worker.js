@@ -86,7 +86,7 @@ async function loadLibrary(address) {
   const { clip_frames, natural_step, stats, transitions, patches = [], playback = [] } = await (await fetched(address)).json();
   const jumps = transitions.map((one) => ({ from: one.from, to: one.to, mirrored: one.mirrored, distance: one.distance }))
     .sort((a, b) => a.distance - b.distance).slice(0, MOST_JUMPS);
-    const found = { start: Int32Array.from(patches, (one) => one.start), end: Int32Array.from(patches, (one) => one.end) };
+  const found = { start: Int32Array.from(patches, (one) => one.start), end: Int32Array.from(patches, (one) => one.end) };
   const leaps = { from: Int32Array.from(playback, ([from]) => from), to: Int32Array.from(playback, ([, to]) => to), mirrored: Uint8Array.from(playback, (row) => (row[3] ? 1 : 0)) };
   page.postMessage({ library: { clip_frames, natural_step, stats, jumps, patches: found, leaps } });
 }

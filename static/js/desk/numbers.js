@@ -2,7 +2,6 @@
 // @ts-check
 import { element } from "../app/element.js";
 import { count, percent, say, sayOr, seconds } from "../app/words.js";
-import { at } from "../studio/settings.js";
 
 /** @typedef {{key: string, value: string, values?: import("../app/words.js").Values}} Row */
 /** @typedef {{library: Api.Library, facts: {stats: Api.LibraryStats} | null, head?: Api.PosesHead | null}} Measured facts and head are null until they are loaded */
@@ -48,10 +47,10 @@ export function comparison(before, after) {
 /** Returns the words for a setting. @param {string} name */
 export const settingName = (name) => sayOr(`remeasure.${name}`, name);
 
-/** Returns a row for each setting that differs. @param {Api.AnalysisParams} before @param {Api.AnalysisParams} after */
+/** Returns a row for each setting that differs. @param {Record<string, unknown>} before @param {Record<string, unknown>} after */
 function settingRows(before, after) {
-  const names = Object.keys(after).filter((name) => JSON.stringify(at(before, name) ?? null) !== JSON.stringify(at(after, name) ?? null));
-  return names.map((name) => element("tr.changed", {}, element("th", { scope: "row" }, settingName(name), " ", element("small", {}, say("desk.compare.setting"))), ...[before, after].map((params) => element("td", {}, settingWords(name, at(params, name))))));
+  const names = Object.keys(after).filter((name) => JSON.stringify(before[name] ?? null) !== JSON.stringify(after[name] ?? null));
+  return names.map((name) => element("tr.changed", {}, element("th", { scope: "row" }, settingName(name), " ", element("small", {}, say("desk.compare.setting"))), ...[before, after].map((params) => element("td", {}, settingWords(name, params[name])))));
 }
 
 /** Returns the value of a setting in words. @param {string} name @param {any} value */

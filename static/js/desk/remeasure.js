@@ -10,7 +10,6 @@ import { mendsOf } from "../parts/mend.js";
 import { problemBox, showProblem } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
 import { analysisDefaults } from "../studio/schema.js";
-import { at } from "../studio/settings.js";
 import { choice, part, rulerFields, slide } from "./remeasure-fields.js";
 import { changedParams, sizeFromRuler } from "./remeasure-params.js";
 import { createPicture } from "./remeasure-picture.js";
@@ -59,7 +58,7 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   const changes = () => changedParams({ draft: draft.value, former, defaults, preset });
   const tell = () => {
     marks.replaceChildren(...marksOf(draft));
-    const names = [...(preset ? ["preset"] : []), ...Object.keys(changes()).filter((name) => name !== "preset" && JSON.stringify(at(draft.value, name)) !== JSON.stringify(at(former, name)))];
+    const names = [...(preset ? ["preset"] : []), .../** @type {(keyof Api.AnalysisChanges)[]} */ (Object.keys(changes())).filter((name) => name !== "preset" && JSON.stringify(draft.value[name]) !== JSON.stringify(former[name]))];
     sent.textContent = names.length ? say("remeasure.sends", { names: names.map(settingName).join(", ") }) : say("remeasure.sends_none");
   };
   draft.watch(tell, life);
@@ -120,10 +119,10 @@ async function follow(desk, { begun: { job_id: jobId, library_id: libraryId }, p
 function marksOf(draft) {
   const { animal_at, head, ignore, camera, animal } = draft.value;
   const row = (/** @type {string} */ text, /** @type {Partial<typeof draft.value>} */ without) => element("li", {}, element("span", {}, text), element("button.quiet", { type: "button", "aria-label": say("remeasure.remove_one", { what: text }), onclick: () => draft.set({ ...draft.value, ...without }) }, say("remeasure.remove")));
-  const place = (/** @type {number[]} */ point) => point.map(Math.round).join(", ");
+  const at = (/** @type {number[]} */ point) => point.map(Math.round).join(", ");
   return [
-    ...(animal_at ? [row(say("remeasure.mark.animal", { at: place(animal_at.at_px), frame: String(animal_at.frame) }), { animal_at: null })] : []),
-    ...(head ? [row(say("remeasure.mark.head", { at: place(head.point), frame: String(head.frame) }), { head: null })] : []),
+    ...(animal_at ? [row(say("remeasure.mark.animal", { at: at(animal_at.at_px), frame: String(animal_at.frame) }), { animal_at: null })] : []),
+    ...(head ? [row(say("remeasure.mark.head", { at: at(head.point), frame: String(head.frame) }), { head: null })] : []),
     ...ignore.map((one, k) => row(say("remeasure.mark.ignore", { size: `${one.box_px[2]} × ${one.box_px[3]}` }), { ignore: ignore.filter((_, idx) => idx !== k) })),
     ...(camera && animal ? [row(say("remeasure.mark.size", { cm: count(100 * animal.length_m) }), { camera: null, animal: null })] : []),
   ];

@@ -8,7 +8,6 @@ import { problemBox } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
 import { control } from "../studio/control.js";
 import { loadFields } from "../studio/schema.js";
-import { at } from "../studio/settings.js";
 import { changedFrom, PAPERS, shownAs } from "./settings.js";
 
 /** Names in the order of use; the service may tell more. */
@@ -30,7 +29,7 @@ export async function optionsBox({ library, params, life, onMade }) {
   const update = () => {
     for (const { name, update: show } of controls) {
       const field = /** @type {import("./settings.js").ShownField} */ (fields.get(name));
-      show(at(settings, name) ?? field.default, { isSet: name in settings, perUnit: field.perUnit });
+      show(/** @type {Record<string, unknown>} */ (settings)[name] ?? field.default, { isSet: name in settings, perUnit: field.perUnit });
     }
   };
   const papers = element("button.quiet", { type: "button", onclick: () => change(PAPERS) }, say("fish.papers"));

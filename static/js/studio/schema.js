@@ -2,7 +2,6 @@
 // @ts-check
 import { get } from "../app/api.js";
 import { proseLimits } from "./limits.js";
-import { at } from "./settings.js";
 
 /**
  * @typedef {{name: string, kind: "number" | "whole" | "boolean" | "choice" | "group" | "other", min: number, max: number,
@@ -37,16 +36,16 @@ const defaultsOf = (schema) => Object.fromEntries(Object.entries(schema?.propert
 function fieldsOf(schemas, params, request) {
   /** @type {Fields} */
   const fields = new Map();
-  const collect = (/** @type {Schema} */ schema, /** @type {string} */ prefix, /** @type {unknown} */ defaults) => {
+  const collect = (/** @type {Schema} */ schema, /** @type {string} */ prefix, /** @type {Record<string, unknown> | null} */ defaults) => {
     for (const [key, property] of Object.entries(schema.properties ?? {})) {
       const name = prefix + key;
       const { type, nullable } = plain(property, schemas);
-      const own = property.default ?? at(defaults, key) ?? null;
+      const own = property.default ?? defaults?.[key] ?? null;
       const isGroup = type.type === "object" && name !== "predator";
       const field = fieldOf(name, { ...type, description: property.description ?? type.description }, own, nullable);
       if (type.items) field.choices = choicesOf(plain(type.items, schemas).type.enum);
       fields.set(name, isGroup ? { ...field, kind: "group" } : field);
-      if (isGroup) collect(type, `${name}.`, own);
+      if (isGroup) collect(type, `${name}.`, /** @type {Record<string, unknown> | null} */ (own));
     }
   };
   collect(schemas[params], "", null);
