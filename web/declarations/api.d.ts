@@ -13,12 +13,12 @@ declare namespace Api {
   type FlockParams = Schemas["FlockParams"];
   type AnalysisParams = Schemas["AnalysisParams"];
   type FishParams = Schemas["FishParams"];
-  /** What an address under /v1 of one thing names. */
+  /** Things by the name of their collection under /v1. */
   type Things = { footage: Footage; libraries: Library; flocks: Flock };
-  /** Parameters as a request gives them: those left out have their defaults. */
   type Goal = Schemas["Goal"];
   type Waypoint = Schemas["Waypoint"];
   type Predator = Schemas["Predator"];
+  /** Parameters as a request gives them: those left out have their defaults. */
   type AnalysisChanges = Schemas["AnalysisOverrides"];
   type FlockChanges = Schemas["FlockOverrides"];
 

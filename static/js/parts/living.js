@@ -16,7 +16,9 @@ const DESCRIBE_MS = 5000;
 
 /** Asks the service for a plan. @param {string} libraryId @param {Api.FlockChanges} params @param {AbortSignal} [signal] */
 export async function preview(libraryId, params, signal) {
-  const response = await request("POST", "/v1/flocks/preview", { body: { library_id: libraryId, ...params }, accept: PLAN, signal });
+  /** @type {Api.Body<"post", "/v1/flocks/preview">} */
+  const body = { library_id: libraryId, ...params };
+  const response = await request("POST", "/v1/flocks/preview", { body, accept: PLAN, signal });
   return decodePlan(await response.arrayBuffer());
 }
 
