@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::attempt::Film;
 use super::{
-    Attempt, Context, Error, Extent, IdSequence, JobInput, Product, Stages, Subject, analysis, flock,
-    overlay,
+    Attempt, Context, Error, Extent, IdSequence, JobInput, Product, Stages, Subject, analysis,
+    flock, overlay,
 };
 use crate::media::VideoWriter;
 use crate::store;
