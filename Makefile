@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service transitions page-bench screenshots ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service hostile transitions page-bench screenshots ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -140,7 +140,7 @@ bench: build target/bench-venv/ready ## measure the speed against ffmpeg, OpenCV
 	$(BENCH) bench/reproduce.py $(RELEASE) target/demo/library target/demo/footage.mp4
 
 # The figures of bench/results. Each of these targets also writes docs/measurements.md.
-measure: accuracy flocks papers service transitions page-bench ## write docs/measurements.md: make measure GENERATOR=goldfish.py FOOTAGE=folder
+measure: accuracy flocks papers service hostile transitions page-bench ## write docs/measurements.md: make measure GENERATOR=goldfish.py FOOTAGE=folder
 	$(BENCH) bench/measurements.py
 
 accuracy: build target/bench-venv/ready ## compare poses with the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program]
@@ -155,6 +155,9 @@ papers: build target/bench-venv/ready ## compare the papers' methods as printed 
 service: build target/bench-venv/ready ## compare the speed of the service with cp and nginx
 	@scripts/system-packages.sh bench
 	$(BENCH) bench/service.py $(RELEASE) --write
+
+hostile: build ## measure what one hostile token at full force costs another
+	python3 -B bench/hostile.py $(RELEASE)
 
 transitions: target/bench-venv/ready ## measure how the search for transitions grows with the film
 	$(BENCH) bench/transitions.py --most 50000 --write

@@ -54,9 +54,9 @@ def main(program, *more):
         measurements.save("service", result())
 
 
-def start(program, data):
+def start(program, data, *flags):
     port = free_port()
-    arguments = [program, "serve", "--bind", f"127.0.0.1:{port}", "--data", data, "--no-sample", "--log", "warn"]
+    arguments = [program, "serve", "--bind", f"127.0.0.1:{port}", "--data", data, "--no-sample", "--log", "warn", *flags]
     service = subprocess.Popen(arguments, stdin=subprocess.DEVNULL)
     address = f"http://127.0.0.1:{port}"
     for _ in range(100):

@@ -1,8 +1,9 @@
 //! `flockreel serve`: API, page and workers in one process (docs/explanation/promises.md, "Graceful stop").
 
+use std::io;
 use std::net::SocketAddr;
 
-use tokio::net::TcpListener;
+use tokio::net::{TcpListener, TcpSocket};
 use tokio::signal::unix::{SignalKind, signal};
 
 use super::{Error, Summary};
@@ -14,6 +15,10 @@ use crate::jobs::sample;
 use crate::jobs::supervisor::Supervisor;
 use crate::logging::say;
 use crate::store::Store;
+
+/// Connections that may wait to be accepted. The kernel silently drops the others of a burst, and their clients wait.
+/// More than `MAX_CONNECTIONS` of the server; Linux allows no more by default.
+const MAX_WAITING_CONNECTIONS: u32 = 4096;
 
 /// Arguments of `serve`.
 #[derive(Debug, clap::Args)]
@@ -81,9 +86,20 @@ async fn serve(config: Config) -> Result<(), Error> {
 /// Returns a listener and its address. Port 0 in `bind` selects a free port.
 pub(super) async fn listen(bind: SocketAddr) -> Result<(TcpListener, SocketAddr), Error> {
     let cannot = |error| Error::Usage(format!("cannot listen: {error}: {bind}"));
-    let listener = TcpListener::bind(bind).await.map_err(cannot)?;
+    let listener = listen_on(bind).map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
     Ok((listener, address))
+}
+
+fn listen_on(bind: SocketAddr) -> io::Result<TcpListener> {
+    let socket = match bind {
+        SocketAddr::V4(_) => TcpSocket::new_v4()?,
+        SocketAddr::V6(_) => TcpSocket::new_v6()?,
+    };
+    // A service that starts again may listen while connections of the former one end.
+    socket.set_reuseaddr(true)?;
+    socket.bind(bind)?;
+    socket.listen(MAX_WAITING_CONNECTIONS)
 }
 
 /// Fails if the service would listen beyond loopback without a valid token in the database, because it would

@@ -8,9 +8,8 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::attempt::Counted;
-use super::lane::Extent;
 use super::masks::Masks;
-use super::{Attempt, Error, JobInput, Product, Stages, Subject, overlay, refusal};
+use super::{Attempt, Error, Extent, JobInput, Product, Stages, Subject, overlay, refusal};
 use crate::media::{Encoding, Limits, Notice, ReadOptions, Video, read_image, write_picture};
 use crate::store::footage::{BACKGROUND, MASKS, VIDEO};
 use crate::store::jobs::Kind;

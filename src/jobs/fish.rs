@@ -5,8 +5,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::lane::Extent;
-use super::{Attempt, Error, JobInput, Product, Stages, Subject};
+use super::{Attempt, Error, Extent, JobInput, Product, Stages, Subject};
 use crate::media::{VideoFormat, VideoWriter};
 use crate::store::jobs::Kind;
 use flockreel_core::fish::{Film, Params, drive};

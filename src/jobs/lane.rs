@@ -2,7 +2,7 @@
 //! with several workers keeps one of them for small jobs, and an owner's small jobs go before the others.
 
 use super::analysis::Summary;
-use super::{Context, JobInput, Subject};
+use super::{Context, Extent, JobInput, Subject};
 use crate::store;
 use crate::store::footage::Footage;
 use crate::store::owners::OwnerFilter;
@@ -11,23 +11,6 @@ use crate::store::resources::Library;
 /// Largest estimated cost of a small job, pixels: less than a minute on two cores. 20 individuals of 400 frames at
 /// 1920 x 1080 cost 0.9 billion with one file.
 const MAX_SMALL_PX: f64 = 1e9;
-
-/// Extent of a film: what the cost of a job depends on.
-#[derive(Clone, Copy, Debug)]
-pub struct Extent {
-    /// Number of frames.
-    pub n_frames: usize,
-    /// Width and height of the picture, pixels.
-    pub image_size_px: [u32; 2],
-}
-
-impl Extent {
-    /// Returns the number of pixels of all frames.
-    pub fn film_px(self) -> f64 {
-        let [width, height] = self.image_size_px;
-        self.n_frames as f64 * f64::from(width) * f64::from(height)
-    }
-}
 
 impl Context {
     /// Returns whether the estimated cost of a job is small. A job whose subject does not exist yet is not.

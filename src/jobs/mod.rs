@@ -55,7 +55,6 @@ use crate::store::jobs::retry::Retry;
 use crate::store::owners::{Account, OwnerFilter};
 use crate::store::{self, Store};
 use flockreel_core::ids::{FootageId, JobId, LibraryId};
-use lane::Extent;
 
 /// Data shared by workers. Smaller than the state of the API.
 #[derive(Clone)]
@@ -199,6 +198,23 @@ impl Subject {
             Subject::Footage(id) => id.0,
             Subject::Library(id) => id.0,
         }
+    }
+}
+
+/// Extent of a film: what the cost of a job depends on.
+#[derive(Clone, Copy, Debug)]
+pub struct Extent {
+    /// Number of frames.
+    pub n_frames: usize,
+    /// Width and height of the picture, pixels.
+    pub image_size_px: [u32; 2],
+}
+
+impl Extent {
+    /// Returns the number of pixels of all frames.
+    pub fn film_px(self) -> f64 {
+        let [width, height] = self.image_size_px;
+        self.n_frames as f64 * f64::from(width) * f64::from(height)
     }
 }
 

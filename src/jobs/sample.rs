@@ -6,10 +6,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::attempt::Film;
-use super::lane::Extent;
 use super::{
-    Attempt, Context, Error, IdSequence, JobInput, Product, Stages, Subject, analysis, flock,
-    overlay,
+    Attempt, Context, Error, Extent, IdSequence, JobInput, Product, Stages, Subject, analysis,
+    flock, overlay,
 };
 use crate::media::VideoWriter;
 use crate::store;

@@ -1,18 +1,19 @@
 """Lets the clock of a service jump while a job runs (docs/explanation/promises.md, "Time jumps"): a day forward, a day
-back, ten seconds back. The job must run once.
+back, ten seconds back. The process of the job stands still meanwhile. The job must run once.
 
     time_jumps.py PROGRAM
 """
 
 import json
+import os
+import signal
 import struct
-import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-from scenario import Service, compile_steps, ended
+from scenario import Service, compile_steps, ended, make_film
 
 DAY_S = 86400
 #: Errors of the clock, seconds, one after the other.
@@ -33,14 +34,14 @@ def main(program):
 
 
 def run(program, folder):
-    film, clock = folder / "film.mp4", folder / "clock"
-    subprocess.run([program, "sample", "-o", film, "--frames", "3000"], check=True, stderr=subprocess.DEVNULL)
+    film, clock = make_film(program, folder), folder / "clock"
     clock.write_bytes(struct.pack("=q", 0))
     with Service(program, folder / "data", compile_steps(folder), CRASH_CLOCK=str(clock)) as service:
         assert service.is_ready()
-        footage = json.loads(service.ask("POST", "/v1/footage", film.read_bytes(), {"Content-Type": "video/mp4"})[2])["id"]
+        footage = json.loads(service.ask("POST", "/v1/footage", film, {"Content-Type": "video/mp4"})[2])["id"]
         job = service.post("/v1/analyses", {"footage_id": footage})["job_id"]
-        wait_until_it_runs(service, job)
+        attempt = attempt_of(service)
+        os.kill(attempt, signal.SIGSTOP)
         for error_s in JUMPS_S:
             # The service has mapped the file, which must therefore keep its length.
             with clock.open("r+b") as file:
@@ -48,6 +49,7 @@ def run(program, folder):
             time.sleep(PAUSE_S)
         now = job_of(service, job)
         faults = [] if now["state"] == "running" else [f"the job is {now['state']} before the last jump"]
+        os.kill(attempt, signal.SIGCONT)
         state = ended(service, job)
         n_attempts = job_of(service, job)["attempt"]
     if state != "done":
@@ -57,9 +59,14 @@ def run(program, folder):
     return faults
 
 
-def wait_until_it_runs(service, job):
-    while job_of(service, job)["state"] != "running":
-        time.sleep(0.1)
+def attempt_of(service):
+    """Returns the process of the running attempt, once there is one."""
+    while True:
+        for tasks in Path(f"/proc/{service.process.pid}/task").glob("*/children"):
+            for child in map(int, tasks.read_text().split()):
+                if b"\0attempt\0" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    return child
+        time.sleep(0.01)
 
 
 def job_of(service, job):

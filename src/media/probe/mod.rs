@@ -107,7 +107,7 @@ pub(in crate::media) fn probe(
     let header = header.map_err(|error| file.explain(error))?;
     let streams = video_streams(&header, limits).map_err(|error| file.explain(error))?;
     if let [only] = streams[..] {
-        check_stream(only, limits, options)?;
+        check_stream(only, limits, options).map_err(|error| file.explain(error))?;
     }
     let packets = packets.unwrap_or_else(read_packets)?;
     let decode = |packets: &Packets| Pictures::read(container, path, packets, limits);
@@ -143,7 +143,8 @@ fn judge(
     options: &ReadOptions,
 ) -> Result<Probe, Error> {
     let stream = choose_stream(streams, packets)?;
-    let [width, height] = check_stream(stream, limits, options)?;
+    let size = check_stream(stream, limits, options);
+    let [width, height] = size.map_err(|error| file.explain(error))?;
     let times = PictureTimes::find(file, stream, packets, decode, limits)?;
     let (timeline, mut notices) = times.timeline(stream, limits, options)?;
     let n_pictures = times.times_s.len();
@@ -199,13 +200,17 @@ fn inspect(path: &Path, limits: &Limits) -> Result<FileInfo, Error> {
 }
 
 impl FileInfo {
-    /// Returns the reason why ffprobe found no video, which is the damage of the file if there is any.
+    /// Returns the reason why ffprobe found no usable video, which is the damage of the file if there is any.
     fn explain(&self, error: Error) -> Error {
         match error {
             Error::NotAVideo(_) if self.ending != Ending::Whole => {
                 Error::Truncated(Damage::NoIndex)
             }
             Error::NotAVideo(_) | Error::NoVideoStream if self.index.is_damaged() => {
+                Error::Truncated(Damage::BrokenIndex)
+            }
+            // The index names the codec.
+            Error::CodecNotAllowed(codec) if codec.is_empty() && self.index.is_damaged() => {
                 Error::Truncated(Damage::BrokenIndex)
             }
             error => error,

@@ -355,7 +355,7 @@ mod tests {
     #[test]
     fn fragmented_film_needs_no_tables_and_other_data_have_no_index() {
         let empty = track(&[]);
-        assert_eq!(read(&film(&[empty.clone()])).damaged, [true]);
+        assert_eq!(read(&film(std::slice::from_ref(&empty))).damaged, [true]);
         assert_eq!(read(&film(&[empty, boxed(b"mvex", &[])])).damaged, [false]);
         assert_eq!(read(b"no boxes at all"), MovIndex::default());
         assert_eq!(read(b""), MovIndex::default());

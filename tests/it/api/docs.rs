@@ -124,7 +124,7 @@ async fn every_example_of_the_document_works_with_the_sample() {
     );
     let [footage, flock] = with_sample(&app).await;
     let examples = examples(&app.json("/openapi.json").await);
-    assert_eq!(examples.len(), 6);
+    assert_eq!(examples.len(), 7);
     for (method, path, example) in examples {
         let id = match path.starts_with("/v1/footage") {
             true => &footage,

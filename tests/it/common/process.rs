@@ -137,6 +137,8 @@ impl Server {
             let line = line.unwrap();
             log = format!("{log}{line}\n");
             let (_, address) = line.split_once("the page is at ")?;
+            // A line of a JSON log goes on after the address.
+            let (address, _) = address.split_once("/\"").unwrap_or((address, ""));
             Some(address.trim_end_matches('/').to_owned())
         });
         let base = base.unwrap_or_else(|| panic!("no address was given:\n{log}"));

@@ -70,7 +70,7 @@ pub struct Params {
     #[default(ClipWeights::Uniform)]
     pub clip_weights: ClipWeights,
     /// Distance below which two clips are similar. null = `kappa` times the natural step.
-    #[schema(maximum = 1000000000000000000u64)]
+    #[schema(maximum = 9000000000000000u64)] // numbers in JSON are exact up to here
     pub epsilon: Option<u64>,
     /// Multiple of the natural step that gives `epsilon` when that is null. If playback is then too short,
     /// the analysis tries larger values.

@@ -155,6 +155,7 @@ fn check_graph(summary: &Summary, n_frames: usize) -> Result<(), Error> {
     let rises = component.windows(2).all(|pair| pair[0] < pair[1]);
     let is_component = rises && component.last().is_none_or(|&last| exists(last));
     require(is_component, "component of library.json")?;
+    let is_playable = |frame: &u32| component.binary_search(frame).is_ok();
     let jumps = summary.playback.jumps.iter();
     let is_graph = jumps
         .clone()
