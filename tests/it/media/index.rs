@@ -24,7 +24,9 @@ impl Film {
     fn find(&self, track: usize, name: &[u8; 4]) -> usize {
         let places = |name: [u8; 4]| {
             let windows = self.0.windows(4).enumerate();
-            windows.filter_map(move |(at, bytes)| (bytes == name).then(|| at - 4))
+            windows
+                .filter(move |(_, bytes)| *bytes == name)
+                .map(|(at, _)| at - 4)
         };
         let start = places(*b"trak").nth(track).expect("a track");
         places(*name).find(|at| *at >= start).expect("such a box")
