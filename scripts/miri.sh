@@ -1,0 +1,15 @@
+#!/bin/sh
+# Runs tests of the algorithms' `unsafe` code under Miri, an interpreter that finds undefined behaviour. Needs the
+# nightly toolchain with its component `miri`. Exits with 3 if this machine has none.
+#
+#   scripts/miri.sh [TEST...]
+set -eu
+cd "$(dirname "$0")/.."
+
+cargo=${CARGO:-cargo}
+if ! "$cargo" +nightly miri --version >/dev/null 2>&1; then
+    echo "miri: CANNOT run: rustup toolchain install nightly --component miri" >&2
+    exit 3
+fi
+[ $# -gt 0 ] || set -- raster:: similarity::kernel:: plan::range_costs:: plan::lanes::
+exec "$cargo" +nightly miri test --quiet --locked --package flockreel-core --lib --target-dir target/miri -- "$@"
