@@ -26,7 +26,7 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.sta
 # Nouns with parameters: command, schema of the parameters, and schema of a request, which has the presets.
 NOUNS = [("an analysis", "analyze", "AnalysisParams", "AnalysisOverrides"),
          ("a flock", "flock", "FlockParams", "FlockOverrides"), ("a virtual fish", "fish", "FishParams", "FishRequest")]
-DEFAULTS = {"FLOCKREEL_WORKERS": "half of the cores, at least 1"}  # those that depend on the machine
+DEFAULTS = {"FLOCKREEL_WORKERS": "half of the cores plus one, at least 2"}  # those that depend on the machine
 
 
 def read(program, words=(), inherited=frozenset()):

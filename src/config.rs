@@ -163,8 +163,8 @@ pub struct Storage {
 /// The workers of a process.
 #[derive(Args, Clone, Debug)]
 pub struct JobSettings {
-    /// Number of jobs that run at once. They share the processor cores. From 2 on, one of them is a small job, or
-    /// none.
+    /// Number of jobs that run at once. They share the processor cores. With 2 or more, one worker takes only
+    /// small jobs.
     #[arg(long, env = "FLOCKREEL_WORKERS", default_value_t = default_workers(), value_name = "N")]
     pub workers: NonZeroUsize,
     /// Memory limit of one job without its media tools, bytes. A job that exceeds it fails with `memory_limit`.

@@ -67,7 +67,7 @@ fn last_value(arguments: &[OsString], flag: &str) -> Option<OsString> {
     values.last()
 }
 
-/// Reads the file. Fails if it is no TOML, or has an unknown setting or an invalid value.
+/// Reads the file. Fails if it is not TOML, or has an unknown setting or an invalid value.
 fn read(file: &Path) -> Result<Settings, Error> {
     let invalid = |what: &str| Error::Usage(format!("{what}: {}", file.display()));
     let text = std::fs::read_to_string(file);

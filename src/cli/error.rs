@@ -22,7 +22,7 @@ pub enum Error {
         sentence: String,
     },
     /// `doctor` found missing parts and has printed them.
-    #[error("parts that flockreel needs are missing, see LACK above: {n_missing}")]
+    #[error("parts that flockreel needs are missing, each marked LACK above: {n_missing}")]
     MissingParts {
         /// Number of missing parts.
         n_missing: usize,

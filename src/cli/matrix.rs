@@ -36,7 +36,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let format = Format::from_extension(&args.output)?;
     if args.candidates && matches!(format, Format::Numbers) {
         return Err(Error::Usage(format!(
-            "the file name of --candidates must end in .png: {}",
+            "with --candidates the output must end in .png: {}",
             args.output.display()
         )));
     }

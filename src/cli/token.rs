@@ -133,7 +133,9 @@ async fn revoke(store: &Store, id: &str) -> Result<Value, Error> {
     if store.revoke_token(id, now_ms()).await? {
         Ok(json!({"id": id, "revoked": true}))
     } else {
-        Err(Error::Usage(format!("no unrevoked token has the id: {id}")))
+        Err(Error::Usage(format!(
+            "no token with this id can be revoked: {id}"
+        )))
     }
 }
 

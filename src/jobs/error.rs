@@ -59,7 +59,7 @@ pub enum Error {
     #[error("{}", .0.sentence)]
     Attempt(FailedAttempt),
     /// The process of the attempt reached the limit of its memory.
-    #[error("the job needs more memory than its limit")]
+    #[error("the job exceeded its memory limit")]
     MemoryLimit,
     /// The process of the attempt died by itself, or was killed from outside.
     #[error("the process of the job crashed: {0}")]

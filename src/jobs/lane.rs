@@ -8,8 +8,8 @@ use crate::store::footage::Footage;
 use crate::store::owners::OwnerFilter;
 use crate::store::resources::Library;
 
-/// Largest estimated cost of a small job, pixels: less than a minute on two cores. 20 individuals of 400 frames at
-/// 1920 x 1080 cost 0.9 billion with one file.
+/// Largest estimated cost of a small job, pixels: less than a minute on two cores. A flock of 20 individuals and 400
+/// frames at 1920 x 1080 costs 0.9 billion with one file.
 const MAX_SMALL_PX: f64 = 1e9;
 
 impl Context {

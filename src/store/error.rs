@@ -26,7 +26,7 @@ pub enum Error {
     #[error("a file of the store could not be read or written: {0}")]
     Io(#[from] std::io::Error),
     /// A folder or file that a setting names cannot be opened or created.
-    #[error("cannot be used: {cause}: {}", path.display())]
+    #[error("the file or folder cannot be used: {cause}: {}", path.display())]
     Unusable {
         /// The folder or file.
         path: PathBuf,
@@ -42,7 +42,7 @@ pub enum Error {
         cause: String,
     },
     /// The bucket returned an error or was not reached.
-    #[error("the bucket returned an error or was not reached: {0}")]
+    #[error("the bucket returned an error or cannot be reached: {0}")]
     Bucket(#[from] object_store::Error),
     /// The content of a stored file differs from its recorded size or hash.
     #[error("the size or hash of a stored file has changed: {0}")]
@@ -78,8 +78,8 @@ pub enum Error {
     },
     /// The files and open uploads of an owner would exceed their maximum size.
     #[error(
-        "{n_bytes} bytes do not fit: the owner has {used_bytes} of at most {max_bytes} bytes; delete films or flocks that \
-         are no longer needed, `GET /v1/usage` shows what takes the space"
+        "{n_bytes} bytes do not fit: the owner uses {used_bytes} of at most {max_bytes} bytes; delete films or flocks that \
+         are no longer needed (`GET /v1/usage` shows what takes the space)"
     )]
     OwnerStorageFull {
         /// Stored and announced bytes.

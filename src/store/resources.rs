@@ -13,9 +13,9 @@ use super::{Error, Store, sql};
 /// Conditions of a list. A resource must meet all of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ResourceFilter {
-    /// The footage, or the footage that the resource was made from.
+    /// Id of the footage that the resource is or was made from.
     pub footage_id: Option<Uuid>,
-    /// The library, or the library that the resource was made from. Not for footage.
+    /// Id of the library that the resource is or was made from. Not for footage.
     pub library_id: Option<Uuid>,
     /// Text that the label of the footage contains, in any case.
     pub name_contains: Option<String>,

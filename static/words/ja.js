@@ -139,7 +139,7 @@ export default {
   "desk.column.time": "時間（秒）", "desk.column.frame": "フレーム", "desk.column.heading": "方向", "desk.column.speed": "速さ（体長/秒）", "desk.column.bend": "曲がり", "desk.column.confidence": "位置の信頼度",
   "desk.tabs": "表示する内容", "desk.tab.jumps": "遷移", "desk.tab.patches": "パッチ", "desk.tab.pose": "軌跡", "desk.tab.trust": "信頼度", "desk.tab.size": "大きさ",
   "desk.matrix.label": "動画の任意の2時点の違いを表す距離行列です。暗いほどよく似ています。最良の遷移の表も同じ内容を示します。",
-  "desk.matrix.help": "2時点の距離行列（Distance Matrix）です。暗い点ほど、2つの時点がよく似ています。ポインターを置くと両方の姿を表示し、クリックすると一方から他方への遷移を再生します。",
+  "desk.matrix.help": "2時点の距離行列です。暗い点ほど、2つの時点がよく似ています。ポインターを置くと両方の姿を表示し、クリックすると一方から他方への遷移を再生します。",
   "desk.matrix.pair": "{a}秒から{b}秒へ。距離は最大値の{share}です。クリックで再生します。", "desk.matrix.mirrored": "{a}秒から{b}秒へ、左右反転。クリックで再生します。",
   "desk.matrix.none": "この計測結果には距離行列の画像がありません。", "desk.mirrored_on": "左右反転の遷移",
   "desk.jumps.best": "最良の遷移20件", "desk.jumps.none": "遷移できるほどよく似た2時点がありません。", "desk.jumps.from": "遷移元", "desk.jumps.to": "遷移先", "desk.jumps.kind": "種類", "desk.jumps.distance": "距離", "desk.jumps.play": "再生",

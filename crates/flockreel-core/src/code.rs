@@ -120,9 +120,9 @@ codes! {
     InputFailed "input_failed" "An input of this job does not exist: the job that makes it failed or was cancelled, \
                                 or the input was deleted."
         "Correct the error of that job, or send the input again. Then repeat the request."
-    CrashedWorker "crashed_worker" "The job was the likely cause of three crashes, and is not tried again by itself."
-        "Try other parameters or another film, and report the error to the operator of the service. After the operator \
-         has removed the cause, `POST /v1/jobs/{id}/retry` starts the job again."
+    CrashedWorker "crashed_worker" "The job probably caused three crashes, and is not repeated automatically."
+        "Try other parameters or another film, and report the error to the operator of the service. When the cause is \
+         removed, `POST /v1/jobs/{id}/retry` starts the job again."
     AlreadyStored "already_stored" "The same film is stored already."
         "Use the stored footage; `GET /v1/footage` lists it."
     InvalidParams "invalid_params" "A parameter is unknown, malformed or out of its range."
@@ -157,8 +157,8 @@ codes! {
     AlreadyFinished "already_finished" "The job has ended and cannot be cancelled."
         "No action is needed. Delete the result if it is not needed."
     RetryRefused "retry_refused" "The job cannot be tried again."
-        "`detail` names the reason. Only jobs that were cancelled, or failed for a reason that may pass, can be tried \
-         again."
+        "`detail` names the reason. Only a job with `retriable` can be tried again: one that was cancelled, crashed or \
+         exceeded a limit."
     IdempotencyKeyReused "idempotency_key_reused" "The Idempotency-Key was already used with another body."
         "Use a new key for a new request."
     RequestInProgress "request_in_progress" "The first request with this Idempotency-Key is still being processed."

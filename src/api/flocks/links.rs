@@ -1,7 +1,7 @@
 //! Signed links to a file of a flock. They need no token and expire
 //! (docs/explanation/promises.md, "Owners are isolated").
 //!
-//! A link shows a film to another person, or opens it in another program. `access/link` signs and checks
+//! With a link, another person can watch a film, or another program can open it. `access/link` signs and checks
 //! links.
 
 use std::ops::RangeInclusive;

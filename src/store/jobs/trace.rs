@@ -1,6 +1,6 @@
 //! Traces: the header `traceparent` (W3C Trace Context), by which a request and the jobs that it queues are found in
-//! the logs of all services. The header goes with the task of the request instead of being an argument of every
-//! function between the request and its job.
+//! the logs of all services. A task-local variable holds the header, so it is no argument of the functions between
+//! the request and its job.
 
 tokio::task_local! {
     static CURRENT: Option<TraceParent>;
@@ -14,8 +14,8 @@ const VERSION_00_BYTES: usize = 55;
 pub struct TraceParent(String);
 
 impl TraceParent {
-    /// Parses a header. Returns `None` if the header does not follow the specification, which then demands to
-    /// ignore it.
+    /// Parses a header. Returns `None` if the header is not valid; the specification requires such a header to be
+    /// ignored.
     pub fn parse(header: &str) -> Option<TraceParent> {
         let parts: Vec<&str> = header.splitn(5, '-').collect();
         let &[version, trace_id, parent_id, flags, ..] = parts.as_slice() else {

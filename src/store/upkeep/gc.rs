@@ -19,11 +19,11 @@ pub struct Waste {
     pub n_uploads: usize,
     /// Number of expired sessions and idempotency keys.
     pub n_rows: usize,
-    /// Number of resources that nobody used for the time of the settings.
+    /// Number of resources that nobody used for `keep_days`.
     pub n_unused: usize,
-    /// Number of jobs that failed or were cancelled before the time of the settings.
+    /// Number of jobs that failed or were cancelled more than `keep_jobs_days` ago.
     pub n_jobs: usize,
-    /// Total size of these files, bytes.
+    /// Total size of the files of all of these, bytes.
     pub n_bytes: u64,
 }
 

@@ -6,8 +6,8 @@ use std::time::{Duration, SystemTime};
 use crate::store::blobs::Folder;
 use crate::store::{Error, Store};
 
-/// Minimum age of a folder without a row before it is removed. The row of a younger one may still be
-/// committed. Free choice.
+/// Minimum age at which a folder without a row is removed. The row of a younger folder may not be committed yet.
+/// Free choice.
 pub(in crate::store) const GRACE: Duration = Duration::from_secs(3600);
 
 /// Result of a sweep.

@@ -175,7 +175,8 @@ fn jumps_per_100_frames(individuals: &[Individual]) -> f64 {
     100.0 * n_jumps as f64 / n_frames.max(1) as f64
 }
 
-/// Returns the frames per 100 that the individual showed on the same mirror side less than `REPEAT_S` before.
+/// Returns the number of repeats per 100 shown frames. A repeat is a frame that the same individual showed, on the
+/// same mirror side, less than `REPEAT_S` earlier.
 fn repeats_per_100_frames(individuals: &[Individual], fps: f64) -> f64 {
     let span = (REPEAT_S * fps).round() as usize;
     let repeats = |individual: &Individual| {

@@ -1,8 +1,8 @@
-//! Splits a scene that changes for good into groups of samples, one after the other in time. Examples are
-//! bedding kicked about, a toy pushed aside and light that dims slowly.
+//! Splits a scene that changes for good into groups of consecutive samples. Examples are bedding kicked about, a
+//! toy pushed aside and light that dims slowly.
 //!
-//! A group is split where two backgrounds explain its samples much better than one. Thumbnails measure this,
-//! without the cells that the animal covers. The module also cuts groups into short windows of equal size.
+//! A group is split where two backgrounds explain its samples much better than one. The comparison uses thumbnails
+//! and leaves out the cells that the animal covers. The module also cuts groups into short windows of equal size.
 
 use super::samples::indices;
 use super::states::{MIN_SAMPLES, SampleGroup};

@@ -16,7 +16,7 @@ pub(super) const MAX_COST: f64 = 24.0;
 const ABSENCE_COST: f64 = 10.0;
 /// A step is a leap beyond this many spreads of the distance. Free choice.
 const LEAP_SPREADS: f64 = 2.0;
-/// A leap leads to another thing when that one was closer by this factor. Free choice.
+/// A leap ends at another thing if a thing seen at its start was nearer to its end by this factor. Free choice.
 const NEARER_FACTOR: f64 = 3.0;
 /// Cost of a leap to a thing that was visible together with the start of the leap. Free choice.
 const LEAP_COST: f64 = 400.0;

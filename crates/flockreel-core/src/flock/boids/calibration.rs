@@ -17,7 +17,7 @@ pub struct Calibration {
     pub turn_rad_per_s: f64,
     /// Root mean square of the turn rate, radians per second.
     pub wander_rad_per_s: f64,
-    /// Slopes in side view. `None` in top view and without depth, where every direction can be shown.
+    /// Slopes in side view. `None` in top view and in a tank without depth: slopes then have no limits.
     pub slopes: Option<Slopes>,
 }
 

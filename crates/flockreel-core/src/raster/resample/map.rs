@@ -44,7 +44,7 @@ impl<'a> Map<'a> {
         }
     }
 
-    /// Returns the step of a picture row through the sprite.
+    /// Returns the step in the sprite from one pixel of a picture row to the next.
     pub(super) fn step(&self) -> Step {
         Step::new(self.per_column.map(fixed))
     }

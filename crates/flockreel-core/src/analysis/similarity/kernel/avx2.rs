@@ -12,8 +12,8 @@ use std::ops::Range;
 use super::{LANES, SadTile, Tile};
 use crate::analysis::similarity::group::{BLOCK_BYTES, Block};
 
-/// Largest number of rows against two columns. Their sums, two columns, one row and one difference fill the
-/// registers.
+/// Largest number of rows that are compared with two columns at once. The sums (two for each row), two columns,
+/// one row and one difference fill the registers.
 const MAX_ROWS: usize = 6;
 /// Number of 32-byte loads per block.
 const STEPS: usize = BLOCK_BYTES / 32;

@@ -68,9 +68,9 @@ pub enum Advice {
         percent(share)
     )]
     LittlePlayback {
-        /// Share of the frames, 0..=1.
+        /// Share of the frames that endless playback can use, 0..=1.
         share: f64,
-        /// Duration, seconds.
+        /// Duration of these frames, seconds.
         duration_s: f64,
     },
     /// Number of frames from which playback can jump, below 20.

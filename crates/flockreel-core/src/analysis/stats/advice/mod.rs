@@ -217,8 +217,8 @@ struct FrameMotion {
     turn_rad_per_s: f64,
 }
 
-/// Returns the motion in each frame over 0.1 s on each side. Without a detection at both ends the animal
-/// rests.
+/// Returns the motion in each frame, measured from 0.1 s before it to 0.1 s after it. The animal counts as resting
+/// if it was not found at one of these times.
 fn motion(library: &Library) -> Vec<FrameMotion> {
     let poses = &library.poses;
     let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);

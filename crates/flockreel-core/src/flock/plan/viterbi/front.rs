@@ -26,7 +26,8 @@ pub(super) struct Chunk<'a> {
     pub(super) station_costs: &'a mut [StationCosts],
     /// Number of stations of its run up to each station, itself included; 0 for barriers.
     pub(super) run_lengths: &'a [u32],
-    /// Leads of paths that landed `landed` frames ago and have played on to each station.
+    /// Offers as leads, by station: paths that jumped `Front::landed` frames ago, have played on to the station, and
+    /// may jump again from here.
     pub(super) offers: &'a [[i32; FRAMES]],
     /// Cost of showing each station.
     pub(super) costs: &'a [[u32; FRAMES]],
