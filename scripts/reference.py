@@ -26,7 +26,7 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.sta
 # Nouns with parameters: command, schema of the parameters, and schema of a request, which has the presets.
 NOUNS = [("an analysis", "analyze", "AnalysisParams", "AnalysisOverrides"),
          ("a flock", "flock", "FlockParams", "FlockOverrides"), ("a virtual fish", "fish", "FishParams", "FishRequest")]
-DEFAULTS = {"FLOCKREEL_WORKERS": "half of the cores plus one, at least 2"}  # those that depend on the machine
+DEFAULTS = {"FLOCKREEL_WORKERS": "half of the cores, at least 1, plus one"}  # those that depend on the machine
 
 
 def read(program, words=(), inherited=frozenset()):
@@ -81,7 +81,7 @@ def table(*rows):
 def command_line(root):
     commands = [command for command in tree(root) if command.words]
     text = f"# Command line\n\n{NOTE}\n{root.about}\n\n```\n{root.usage}\n```\n\nResults go to files. Progress and "
-    text += "errors go to stderr. Exit status: 0 for success, 2 for bad usage or bad input, 1 for a failure inside.\n"
+    text += "errors go to stderr. Exit status: 0 for success, 2 for bad usage or bad input, 1 for an internal failure.\n"
     text += table(["command", "meaning"], *([f"`{command.words}`", f"{command.about}."] for command in commands))
     text += "\n## Flags of every command\n" + flags(root)
     for command in commands:
@@ -99,8 +99,8 @@ def settings(root, document):
     for command, item in ((command, item) for command in tree(root) for item in command.items if item.env):
         users.setdefault(item.env, (item, []))[1].append(f"`{command.words}`" if command.words else "all")
     rows = [[f"`{i.term}`", f"`{env}`", i.default, ", ".join(by), i.meaning] for env, (i, by) in users.items()]
-    text = f"# Settings\n\n{NOTE}\nA flag overrides the environment variable, the variable the file of `--config`, "
-    text += "and the file the default.\nThe file is TOML. Its keys are the flags without leading dashes:\n\n"
+    text = f"# Settings\n\n{NOTE}\nFlags override environment variables, which override the file of `--config`, "
+    text += "which overrides the defaults.\nThe file is TOML. Its keys are the flags without leading dashes:\n\n"
     text += '```toml\nbind = "127.0.0.1:9000"\nmax-upload-bytes = 1000000\nno-sample = true\n```\n'
     text += table(["flag", "environment variable", "default", "commands", "meaning"], *rows)
     return text + "".join(parameters(document["components"]["schemas"], *noun) for noun in NOUNS)
@@ -110,7 +110,8 @@ def parameters(schemas, noun, command, name, request):
     """Returns the section about the parameters of a noun, whose schema has this name."""
     presets = [preset for preset in schemas[request]["properties"]["preset"]["enum"] if preset]
     text = f"\n## Parameters of {noun}\n\nThe API takes them by name, and `flockreel {command} --set NAME=JSON` as well. "
-    text += f"A dot leads into an object, and `[]` stands for the entries of a list.\nPresets: {codes(presets)}.\n"
+    text += "`a.b` is the field `b` of the object `a`, and `[]` stands for each entry of a list.\n"
+    text += f"Presets: {codes(presets)}.\n"
     return text + table(["parameter", "default", "values", "meaning"], *parameter_rows(schemas, schemas[name]))
 
 

@@ -14,7 +14,7 @@ pub struct Config {
     /// Address and port to listen on. An address other than loopback requires authentication.
     #[arg(long, env = "FLOCKREEL_BIND", default_value = "127.0.0.1:8080")]
     pub bind: SocketAddr,
-    /// Which requests need a token: `auto` all if the address is not loopback, `required` always all.
+    /// Requests that need a token.
     #[arg(long, env = "FLOCKREEL_AUTH", default_value = "auto")]
     pub auth: Auth,
     /// Locations of the database and the files.
@@ -79,8 +79,8 @@ pub struct OwnerSpace {
 /// Ages at which data is deleted.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct Retention {
-    /// Days after which footage, libraries, flocks and virtual fish that nobody used are deleted; 0 keeps them. Pinned
-    /// ones stay, and so does everything that a kept one was made from.
+    /// Days after which unused footage, libraries, flocks and virtual fish are deleted; 0 keeps them. Pinned
+    /// ones are kept, with everything from which a kept one was made.
     #[arg(
         long,
         env = "FLOCKREEL_KEEP_DAYS",
@@ -103,8 +103,7 @@ pub struct Retention {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Media tools")]
 pub struct MediaTools {
-    /// Isolation of ffmpeg: `auto` uses every protection that this machine has, `strict` requires them all,
-    /// `off` applies only resource limits.
+    /// Isolation of ffmpeg, the program that reads and writes videos.
     #[arg(
         long,
         global = true,
@@ -135,7 +134,8 @@ pub enum SandboxMode {
 /// Locations of the database and the files.
 #[derive(Args, Clone, Debug)]
 pub struct Storage {
-    /// Local folder for work in progress, and for the database and all files unless they are elsewhere.
+    /// Local folder for work in progress. It also holds the database and all files, unless --database or
+    /// --store names another place.
     #[arg(
         long,
         global = true,
@@ -164,10 +164,11 @@ pub struct Storage {
 #[derive(Args, Clone, Debug)]
 pub struct JobSettings {
     /// Number of jobs that run at once. They share the processor cores. With 2 or more, one worker takes only
-    /// small jobs.
+    /// small jobs, which take less than a minute.
     #[arg(long, env = "FLOCKREEL_WORKERS", default_value_t = default_workers(), value_name = "N")]
     pub workers: NonZeroUsize,
-    /// Memory limit of one job without its media tools, bytes. A job that exceeds it fails with `memory_limit`.
+    /// Memory limit of one job, bytes. It does not include ffmpeg, which has a limit of its own. A job that
+    /// exceeds it fails with `memory_limit`.
     #[arg(
         long,
         env = "FLOCKREEL_JOB_MEMORY_BYTES",

@@ -36,8 +36,7 @@ pub struct Args {
     /// if it has one.
     #[arg(long, value_name = "DIR|VIDEO")]
     masks: Option<PathBuf>,
-    /// Calibrated camera, which gives results in metres, as JSON: {"z_min_m": 0.7, "pane_px_per_m": 1000,
-    /// ...}.
+    /// File with the calibrated camera, for results in metres: {"z_min_m": 0.7, "pane_px_per_m": 1000, ...}.
     #[arg(long, value_name = "JSON_FILE")]
     camera: Option<PathBuf>,
     /// Length of the animal from the nose to the tip of the tail, metres. Needs --animal-height.

@@ -23,7 +23,7 @@ pub struct Args {
     /// File to write: .npy for numbers (NumPy, at most 8192 frames), .png for a picture.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Compare each clip with the mirror images of the clips.
+    /// Compare each clip with the mirror image of each clip.
     #[arg(long)]
     mirrored: bool,
     /// Draw the pairs of similar clips (distance below epsilon) and the transitions among them. Needs .png.

@@ -85,10 +85,11 @@ enum Command {
     Worker(worker::Args),
     /// Create, list and revoke the tokens that give access to the service from other machines.
     Token(token::Args),
-    /// Check the data folder: every file must match its row and hash, and every job must have a valid state.
+    /// Check the data folder: every file must match its record in the database, and every job must have a
+    /// valid state.
     Check(check::Args),
-    /// Remove unused data: leftovers of crashes, expired uploads, sessions and stored responses, and what is older than the
-    /// settings allow.
+    /// Remove unused data: leftovers of crashes, expired uploads, sessions and stored responses, and data
+    /// older than the settings allow.
     Gc(gc::Args),
     /// Copy the data folder, even while a service uses it. To restore, run `serve --data` on the copy.
     Backup(backup::Args),

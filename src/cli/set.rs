@@ -35,7 +35,7 @@ pub(super) fn finite(text: &str) -> Result<f64, String> {
 /// Returns the help of `--set`, with an example of the command.
 pub(super) fn help(example: &str) -> String {
     format!(
-        "Set any parameter by its name in the API; the value is JSON, a bare word is a string. Repeatable. Example: \
+        "Set any parameter by its name in the API; the value is JSON, or a word without quotes. Repeatable. Example: \
          --set {example}"
     )
 }

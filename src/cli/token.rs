@@ -53,8 +53,8 @@ struct CreateArgs {
     /// Maximum number of jobs of the owner that are queued or running at once.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(i64).range(0..), value_name = "N")]
     quota: i64,
-    /// Owner whose data the token accesses: the id of another token, which this one can replace, or `local`
-    /// for data that was created without a token. Default: a new owner without data.
+    /// Owner whose data the token accesses: the id of another token, to share its data or to replace it, or
+    /// `local` for data that was created without a token. Default: a new owner without data.
     #[arg(long, value_name = "ID")]
     owner: Option<String>,
 }

@@ -171,7 +171,7 @@ def test_the_shapes_are_the_masks_within_a_pixel(reel, filled_service, flock):
 
 
 def test_the_living_view_keeps_the_moment(reel, flock):
-    reel.get_by_text("Alive", exact=True).click()
+    reel.get_by_text("Live", exact=True).click()
     expect(reel.locator(".living canvas")).to_be_visible(timeout=LOAD_MS)
     expect(reel.locator(".time")).to_contain_text(f"frame {round(flock['fps'])}")
     expect(reel).to_have_url(re.compile("view=living"))

@@ -51,7 +51,7 @@ codes! {
         "Film at a higher resolution: each side of the picture needs at least 16 pixels."
     TooManyFrames "too_many_frames" "The footage has more frames than the limit."
         "Send a part of the film, for example with `ffmpeg -i film -an -frames:v 20000 -c:v libx264 -crf 16 piece.mp4`."
-    TooManyStreams "too_many_streams" "The file holds more streams than the limit."
+    TooManyStreams "too_many_streams" "The file holds more streams (picture, sound, subtitles) than the limit."
         "Send only the video stream, for example with `ffmpeg -i film -an -sn -dn -c:v libx264 -crf 16 film-alone.mp4`."
     TooLong "too_long" "The footage lasts longer than the limit."
         "Send a part of the film, for example with `ffmpeg -i film -an -t 600 -c:v libx264 -crf 16 piece.mp4`. To \
@@ -59,7 +59,7 @@ codes! {
     TooFast "too_fast" "The frame rate is above the limit."
         "Reduce the frame rate, for example with `ffmpeg -i film -an -r 60 -c:v libx264 -crf 16 slower.mp4`, or set \
          the true rate, for example with `--fps 240`."
-    Truncated "truncated" "The file is cut off or damaged inside."
+    Truncated "truncated" "The file is incomplete or damaged."
         "Copy the file from the camera again. If no complete copy exists, send the readable part, for example with \
          `ffmpeg -i film -an -c:v libx264 -crf 16 rest.mp4`."
     Encrypted "encrypted" "The video is encrypted."
@@ -69,18 +69,18 @@ codes! {
     TooFewFrames "too_few_frames" "The footage has too few frames to analyze."
         "Film for longer. An analysis needs at least 16 frames; half a minute or more is recommended."
     TimeLimit "time_limit" "Processing exceeded its time limit."
-        "Send a shorter or smaller film, or request fewer individuals or frames."
+        "Send a shorter film or one with fewer pixels, or request fewer individuals or frames."
     MemoryLimit "memory_limit" "Processing exceeded its memory limit."
-        "Send a shorter or smaller film, or request fewer individuals or frames."
+        "Send a shorter film or one with fewer pixels, or request fewer individuals or frames."
     DecoderCrashed "decoder_crashed" "The video decoder or encoder stopped unexpectedly."
         "Convert the film with `ffmpeg -i film -an -c:v libx264 -crf 16 converted.mp4` and try again. If the error \
          returns, report it to the operator of the service."
     StorageFull "storage_full" "The disk has too little free space."
         "Delete results that are no longer needed, or ask the operator of the service for more disk space. Then try \
          again."
-    OwnerStorageFull "owner_storage_full" "The stored files and open uploads of the owner have reached their limit."
+    OwnerStorageFull "owner_storage_full" "Your stored files and open uploads have reached the limit of their space."
         "Delete films, libraries, flocks or virtual fish that are no longer needed, or cancel open uploads; `GET /v1/usage` \
-         shows what takes the space. Or ask the operator of the service for a higher limit (`--max-owner-bytes`)."
+         shows how much space each kind takes. Or ask the operator of the service for a higher limit (`--max-owner-bytes`)."
     // Analysis (docs/explanation/algorithms.md, "Refused footage").
     NothingMoves "nothing_moves" "No moving animal was found in the film."
         "Film an animal that moves and that differs from the background in color or brightness. Or send a picture of \
@@ -96,7 +96,7 @@ codes! {
     BackgroundNotStatic "background_not_static" "Large parts of the picture change during the whole film."
         "Use a tripod, fix zoom and focus, and film a still scene. Exclude a moving part of the picture, for example \
          with `--ignore 0,0,200,100`, or measure a steady part of the film, for example with `--from 2 --to 20`."
-    CameraMoved "camera_moved" "The camera moved and stayed in no position long enough."
+    CameraMoved "camera_moved" "The camera moved too often: it kept no position for long enough."
         "Measure a part of the film with a still camera, for example with `--from 2 --to 20`, or film again with the \
          camera fixed."
     LightChanges "light_changes" "The light changes too often or too strongly to be corrected."
@@ -117,12 +117,12 @@ codes! {
     NoTransitions "no_transitions" "The footage has too few similar moments for endless playback."
         "Film for longer, so that the animal returns to similar poses."
     // All jobs and uploads.
-    InputFailed "input_failed" "An input of this job does not exist: the job that makes it failed or was cancelled, \
-                                or the input was deleted."
-        "Correct the error of that job, or send the input again. Then repeat the request."
-    CrashedWorker "crashed_worker" "The job probably caused three crashes, and is not repeated automatically."
-        "Try other parameters or another film, and report the error to the operator of the service. When the cause is \
-         removed, `POST /v1/jobs/{id}/retry` starts the job again."
+    InputFailed "input_failed" "The film or library for this job is missing: it was deleted, or the job that should \
+                                have made it failed or was cancelled."
+        "Follow the advice of that job, or send the film again. Then repeat the request."
+    CrashedWorker "crashed_worker" "The job probably caused three crashes, and is not tried again automatically."
+        "Try other parameters or another film, and report the error to the operator of the service. After the operator \
+         has removed the cause, `POST /v1/jobs/{id}/retry` starts the job again."
     AlreadyStored "already_stored" "The same film is stored already."
         "Use the stored footage; `GET /v1/footage` lists it."
     InvalidParams "invalid_params" "A parameter is unknown, malformed or out of its range."
@@ -157,8 +157,7 @@ codes! {
     AlreadyFinished "already_finished" "The job has ended and cannot be cancelled."
         "No action is needed. Delete the result if it is not needed."
     RetryRefused "retry_refused" "The job cannot be tried again."
-        "`detail` names the reason. Only a job with `retriable` can be tried again: one that was cancelled, crashed or \
-         exceeded a limit."
+        "`detail` names the reason. Only a job that was cancelled, crashed or exceeded a limit can be tried again."
     IdempotencyKeyReused "idempotency_key_reused" "The Idempotency-Key was already used with another body."
         "Use a new key for a new request."
     RequestInProgress "request_in_progress" "The first request with this Idempotency-Key is still being processed."

@@ -36,8 +36,8 @@ pub struct Args {
     frames: Option<u32>,
     #[arg(long, help = set::parameter_help::<Params>("seed"))]
     seed: Option<u64>,
-    /// Make a loop: the last frame leads into the first, so that the film repeats without a seam. A loop has
-    /// 30 to 5000 frames. Use at least 10 seconds, so that the individuals have time to swim back.
+    /// Make a loop: the last frame leads into the first, so that the film repeats without a visible cut. A
+    /// loop has 30 to 5000 frames. Use at least 10 seconds, so that the individuals have time to return.
     #[arg(long = "loop")]
     is_loop: bool,
     #[arg(long, help = set::presets_help::<Params>())]
@@ -47,13 +47,13 @@ pub struct Args {
     rules: Option<String>,
     #[arg(long, value_name = "NAME=JSON", help = set::help("rules.wander=0.5"))]
     set: Vec<String>,
-    /// Write the plan, flock.json, here.
+    /// Also write the plan to this file (the format of flock.json).
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Write a chart that compares the headings of boids and individuals to this SVG file.
+    /// Also write a chart of the headings of boids and individuals to this SVG file.
     #[arg(long, value_name = "SVG")]
     plan_picture: Option<PathBuf>,
-    /// Film this plan, a flock.json of the same library, instead of making one.
+    /// Draw the flock of this plan, a flock.json of the same library, instead of planning a new one.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["is_loop", "count", "spacing", "frames", "seed", "preset", "rules", "set"])]
     from: Option<PathBuf>,
 }

@@ -19,7 +19,7 @@ use crate::parameters::Parameters;
 #[schema(as = FlockParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Number of individuals. null = as many as the tank has room for, limited to 2..=20.
+    /// Number of individuals. null = as many as the tank has room for, but 2 to 20.
     #[schema(minimum = 1, maximum = 10000)]
     pub count: Option<u32>,
     /// Length of the video in frames, at most 10,000 without `position: film`. `count` times `frames` is at
@@ -36,8 +36,8 @@ pub struct Params {
     /// radii are scaled until the flock keeps it, as far as the tank has room. null = no target.
     #[schema(minimum = 0.2, maximum = 10)]
     pub spacing_bl: Option<f64>,
-    /// Whether the last frame leads into the first, so that the video repeats without a seam. A loop has
-    /// 30..=5000 frames, excludes `position: papers`, and treats `position: film` as `leash`.
+    /// Whether the last frame leads into the first, so that the video repeats without a visible cut. A loop
+    /// has 30 to 5000 frames. It refuses `position: papers`, and treats `position: film` as `leash`.
     #[serde(rename = "loop")]
     pub is_loop: bool,
     /// Matching of source frames to boids.
@@ -57,16 +57,17 @@ pub struct Params {
     #[default = 0.05]
     #[schema(minimum = 0, maximum = 0.3)]
     pub variation: f64,
-    /// Rule of separation: repulsion, or rule A of Okabe et al.
+    /// Rule of separation: `repulsion`, or `papers` (rule A of Okabe et al.).
     #[default(Separation::Repulsion)]
     pub separation: Separation,
-    /// How an individual follows its boid.
+    /// How an individual follows its boid: `film` by the filmed steps, `leash` near the boid, `boid` at its
+    /// position, `papers` by the sum of its speeds (Okabe et al.).
     #[default(Position::Film)]
     pub position: Position,
     /// Whether boids at the edge of the flock may lead it for 1 to 3 seconds (Hartman & Benes 2006).
     #[default = true]
     pub leaders: bool,
-    /// Area in which the flock may swim.
+    /// Area in which the flock may move: `seen`, where the animal was seen, or `picture`, the whole image.
     #[default(TankExtent::Seen)]
     pub tank: TankExtent,
     /// Positions that attract the flock.
@@ -77,8 +78,8 @@ pub struct Params {
     pub obstacles: Vec<Obstacle>,
     /// Predator that the flock flees from. null = none.
     pub predator: Option<Predator>,
-    /// Depth of the tank in side view, body lengths. null = the range of depths of the filmed animal,
-    /// limited to 1..=6. 0 = boids move in the image plane. Top view ignores it.
+    /// Depth of the tank in side view, body lengths. null = the range of depths of the filmed animal, but 1
+    /// to 6. 0 = boids move in the image plane. Top view ignores it.
     #[schema(minimum = 0, maximum = 100)]
     pub depth_bl: Option<f64>,
     /// Drawing and encoding of the video.
@@ -89,7 +90,8 @@ pub struct Params {
 #[derive(Clone, Debug, PartialEq, SmartDefault, Serialize, Deserialize, ToSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Matching {
-    /// Quantity that is matched.
+    /// Quantity by which film frames are chosen for a boid: `heading` in the image, `direction` in space, or
+    /// `position` (velocity in the image).
     #[default(MatchBy::Heading)]
     pub by: MatchBy,
     /// Weight of the heading error that rotation cannot correct, per radian. Top view instead compares how
@@ -110,7 +112,7 @@ pub struct Matching {
     #[default = 10.0]
     #[schema(minimum = 0, maximum = 45)]
     pub rho_deg: f64,
-    /// Weight of the speed error: the difference of log speed between animal and boid.
+    /// Weight of the speed error: the difference between the logarithms of the speeds of animal and boid.
     #[default = 0.3]
     #[schema(minimum = 0, maximum = 4)]
     pub w_v: f64,
@@ -128,8 +130,8 @@ pub struct Matching {
     #[default = 0.3]
     #[schema(minimum = 0, maximum = 4)]
     pub w_p: f64,
-    /// Length of a segment in frames. null = 3 s. With `position: film` a flock is simulated,
-    /// planned and placed segment by segment. Each boid starts a segment at the position of its animal.
+    /// Length of a segment in frames. null = 3 s. With `position: film` a flock is simulated, planned and
+    /// placed one segment after the other. Each boid starts a segment at the position of its animal.
     #[schema(minimum = 2, maximum = 2000)]
     pub segment_frames: Option<u32>,
 }

@@ -19,15 +19,16 @@ use crate::parameters::{CoordinatePx, Parameters};
 #[schema(as = AnalysisParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Frame rate, frames per second. null = as the file says. When set, each picture of the file is used
-    /// once.
+    /// Frame rate, frames per second. null = as the file says. If it is set, each picture of the file is used
+    /// once, whatever its time.
     #[schema(minimum = 0.01, maximum = 1000)]
     pub fps: Option<f64>,
     /// Width of a pixel divided by its height. null = as the file says.
     #[schema(minimum = 0.1, maximum = 10)]
     pub pixel_aspect: Option<f64>,
     /// Start of the measured part, seconds from the first frame of the file. null = the first frame. Frames
-    /// keep their numbers and times in the film; those before have no animal.
+    /// keep their numbers and times in the film; frames outside of the part count as frames without the
+    /// animal.
     #[schema(minimum = 0, maximum = 1000000)]
     pub from_s: Option<f64>,
     /// End of the measured part, seconds from the first frame of the file. null = the last frame.
@@ -42,38 +43,43 @@ pub struct Params {
     pub view: Option<ViewParam>,
     /// Calibrated camera. null = no results in metres.
     pub camera: Option<CameraParams>,
-    /// Known size of the animal. null = no depth.
+    /// Size of the animal. null = unknown, so there are no results in metres.
     pub animal: Option<AnimalParams>,
-    /// Smallest difference from the background that counts as the animal, levels of 255.
+    /// Smallest difference from the background that counts as the animal, on the scale of brightness from 0
+    /// to 255.
     #[default = 18]
     #[schema(minimum = 1, maximum = 254)]
     pub threshold: u8,
-    /// Behavior when several animals move.
+    /// Behavior when several animals move: `one` refuses the footage, `largest` follows the largest animal.
     #[default(Follow::One)]
     pub follow: Follow,
-    /// Whether to cut out sprites of an animal that is too small to show.
+    /// Whether to cut out an animal with a median area below 24 square pixels: `auto` does not, `always`
+    /// does. Without cut-out pictures there is no flock.
     #[default(CutSprites::Auto)]
     pub sprites: CutSprites,
-    /// Scale of the sprites: `native` as filmed, `depth` at one height in side view.
+    /// Scale of the sprites: `native` as filmed. `depth` gives the animal the same height in all frames (side
+    /// view only).
     #[default(ScaleMode::Native)]
     pub scale_mode: ScaleMode,
-    /// Position of the head in one frame. It decides between head and tail.
+    /// Position of the head in one frame. It decides which end of the animal is the head.
     pub head: Option<HeadParam>,
     /// Whether to smooth positions and directions over time. false = the raw values of each frame.
     #[default = true]
     pub smooth: bool,
-    /// Clip length f, frames. null = 8 at 30 frames per second, in proportion to the frame rate. At most 24 with
-    /// `clip_weights: binomial`.
+    /// Length of a clip (the successive frames that are compared together), frames. null = 8 at 30 frames per
+    /// second, in proportion to the frame rate. At most 24 with `clip_weights: binomial`.
     #[schema(minimum = 1, maximum = 120)]
     pub clip_frames: Option<u32>,
-    /// Weights of the frames of a clip in the distance: equal, or binomial, where the middle counts most.
+    /// Weights of the frames of a clip in the distance: `uniform`, or `binomial`, where the middle frames
+    /// count most.
     #[default(ClipWeights::Uniform)]
     pub clip_weights: ClipWeights,
-    /// Distance below which two clips are similar. null = `kappa` times the natural step.
+    /// Distance below which two clips are similar. null = `kappa` times the natural step, the median distance
+    /// of successive clips.
     #[schema(maximum = 9000000000000000u64)] // numbers in JSON are exact up to here
     pub epsilon: Option<u64>,
-    /// Multiple of the natural step that gives `epsilon` when that is null. If playback is then too short,
-    /// the analysis tries larger values.
+    /// If `epsilon` is null, it is `kappa` times the natural step. A larger value allows more jumps, but they
+    /// may be visible. If playback is too short, the analysis tries larger values.
     #[default = 2.0]
     #[schema(exclusive_minimum = 0, maximum = 1000000)]
     pub kappa: f64,
@@ -124,7 +130,7 @@ pub struct CameraParams {
     /// Distance from the camera to the front pane, metres.
     #[schema(minimum = 0.000001, maximum = 10000)]
     pub z_min_m: f64,
-    /// Pixels per metre on the pane.
+    /// Pixels per metre of a ruler held on the pane.
     #[schema(minimum = 0.000001, maximum = 1000000000)]
     pub pane_px_per_m: f64,
     /// Image point on the optical axis, pixels. null = the center of the image.

@@ -55,11 +55,11 @@ pub struct Rules {
     #[default = 6.0]
     #[schema(minimum = 0.1, maximum = 50)]
     pub cohesion_bl: f64,
-    /// Field of view, degrees.
+    /// Field of view of a boid, degrees.
     #[default = 300.0]
     #[schema(minimum = 1, maximum = 360)]
     pub view_deg: f64,
-    /// Largest number of neighbors that count, the nearest first.
+    /// Largest number of neighbors to which a boid responds, the nearest first.
     #[default = 16]
     #[schema(minimum = 1, maximum = 2000)]
     pub neighbors: u32,
@@ -111,7 +111,7 @@ pub struct Goal {
     #[serde(default)]
     #[schema(default = json!(null), minimum = 0, maximum = 1000000)]
     pub until_s: Option<f64>,
-    /// Weight.
+    /// Strength of the attraction, a weight like those of `rules`.
     #[serde(default = "usual_weight")]
     #[schema(default = usual_weight, minimum = 0, maximum = 20)]
     pub weight: f64,

@@ -21,7 +21,8 @@ pub struct Render {
     #[default(Background::Plate)]
     #[schema(value_type = String, pattern = "^(plate|transparent|#[0-9a-fA-F]{6})$")]
     pub background: Background,
-    /// Drawing method at a jump: `fade` or `morph`.
+    /// Drawing at a jump: `fade` (cross-fade), or `morph`, a fade in which both shapes also change into each
+    /// other.
     #[default(Cut::Fade)]
     pub cut: Cut,
     /// Share of an animal's color that haze replaces per body length of depth. 0 = no haze.
