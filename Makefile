@@ -156,8 +156,8 @@ service: build target/bench-venv/ready ## compare the speed of the service with 
 	@scripts/system-packages.sh bench
 	$(BENCH) bench/service.py $(RELEASE) --write
 
-hostile: build ## measure what one hostile token at full force costs another
-	python3 -B bench/hostile.py $(RELEASE)
+hostile: build target/bench-venv/ready ## measure what one hostile token at full force costs another
+	$(BENCH) bench/hostile.py $(RELEASE)
 
 transitions: target/bench-venv/ready ## measure how the search for transitions grows with the film
 	$(BENCH) bench/transitions.py --most 50000 --write

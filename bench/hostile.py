@@ -1,6 +1,6 @@
 """Measures what one hostile token costs another (docs/explanation/promises.md, "Overload").
 
-    bench/hostile.py target/release/flockreel [SECONDS]
+    bench/hostile.py target/release/flockreel [SECONDS]    also writes bench/results/hostile.json
 
 One token uses everything at full force: event streams, idle connections, previews, large flocks, uploads, signed links
 and slow downloads. Meanwhile another token asks for small JSON and makes a flock of 20 individuals. Its times are
@@ -20,7 +20,8 @@ import time
 import urllib.request
 from pathlib import Path
 
-from service import start
+import measurements
+from service import machine, start
 
 N_STREAMS = 2100
 N_IDLE = 500
@@ -53,9 +54,18 @@ def main(program, seconds="30"):
         finally:
             service.terminate()
             service.wait(timeout=60)
-    print(f"small JSON, idle:    {told(idle)}")
-    print(f"small JSON, attack:  {told(busy)} (bar: all 200, p99 < 200 ms)")
-    print(f"flock of 20:         {idle_s:.1f} s idle, {busy_s:.1f} s during the attack (bar: 3 times)")
+    rows = [["idle", *told(idle), f"{idle_s:.1f} s"], ["during the attack", *told(busy), f"{busy_s:.1f} s"],
+            ["bar", "", "< 200 ms", "", "all 200", "3 times"]]
+    measurements.save("hostile", {
+        "title": "One hostile token",
+        "about": f"One token uses everything at full force: {N_STREAMS} event streams, {N_IDLE} idle connections, and {N_OF_EACH} each of previews, "
+                 "large flocks, uploads, signed links and slow downloads, again and again. Another token asks for small JSON "
+                 f"{SMALL_PER_S} times a second and makes a flock of {FLOCK['count']} x {FLOCK['frames']}. Measured on {machine()}.",
+        "command": "make hostile",
+        "head": ["service", "requests", "p99", "longest", "answers", "flock"],
+        "rows": rows,
+    })
+    print("\n".join(" | ".join(row) for row in rows))
     sys.exit(0 if set(busy[1]) == {200} and p99_ms(busy[0]) < 200 and busy_s < 3 * idle_s else 1)
 
 
@@ -134,7 +144,8 @@ def p99_ms(times_ms):
 
 def told(measured):
     times_ms, statuses = measured
-    return f"{len(times_ms)} requests, p99 {p99_ms(times_ms):.1f} ms, longest {max(times_ms):.1f} ms, {dict(statuses)}"
+    answers = ", ".join(f"{n} x {status}" for status, n in statuses.items())
+    return [str(len(times_ms)), f"{p99_ms(times_ms):.1f} ms", f"{max(times_ms):.1f} ms", answers]
 
 
 async def request(address, key, method, path, body=b"", media_type="application/json"):

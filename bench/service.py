@@ -207,11 +207,15 @@ def line(what, measured, runs, bar, is_met):
     print(f"{what:56} {ROWS[-1][1]} (bar: {bar}) {runs}", flush=True)
 
 
-def result():
+def machine():
     cpu = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
+    return f"{os.cpu_count()} cores ({cpu[1] if cpu else platform.machine()})"
+
+
+def result():
     return {
         "title": "Speed of the service",
-        "about": f"Requests and transfers over loopback, on {os.cpu_count()} cores ({cpu[1] if cpu else platform.machine()}). The cores are shared "
+        "about": f"Requests and transfers over loopback, on {machine()}. The cores are shared "
                  "with wrk, nginx and curl. Runs of transfers list flockreel first and the other program second.",
         "command": "make service",
         "head": ["what", "measured", "runs", "bar"],
