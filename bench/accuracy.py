@@ -236,7 +236,7 @@ def case_tables(results):
     yield ""
     yield from table(["film", "found", "error, median", "error, p95", "within 0.1", "over 0.25", "false detections", "wrong heads"], rows)
     yield from ("", "### Calibration", "")
-    yield ("A row has all frames of the films above with similar confidence. The columns *mean* and *right* should be equal. `confidence` is right if "
+    yield ("Each row has the frames of the films above with similar confidence. The columns *mean* and *right* should be equal. `confidence` is right if "
            "the error is at most 0.1 BL, `head_confidence` if the head is at the right end. Each film has the same weight.")
     for name in ("confidence", "head_confidence"):
         yield ""

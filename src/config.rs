@@ -1,5 +1,5 @@
-//! All settings of the service: default, command-line flag and environment variable of each. The README
-//! documents every variable; `tests/it/tidy` checks that.
+//! All settings of the service: default, command-line flag and environment variable of each.
+//! docs/reference/settings.md lists them; `tests/it/tidy` checks that.
 
 use std::net::SocketAddr;
 use std::num::NonZeroUsize;
