@@ -326,6 +326,8 @@ def test_one_click_copies_a_link_to_the_finished_film(visitor, filled_service):
     friend = visitor()
     friend.goto(link)
     expect(heading(friend)).to_have_text(say(friend, "shared.title", n=2))
+    # The friend sees that the film is transparent.
+    expect(friend.locator(".stage.is-clear video")).to_have_attribute("src", re.compile("video.webm"))
     clear = friend.get_by_role("link", name=say(friend, "shared.save_clear"))
     assert fetch(filled_service + clear.get_attribute("href"))[:4] == b"\x1aE\xdf\xa3"
 

@@ -22,6 +22,8 @@ export function copyButton(label, textOf, { onCopied = () => {}, onRefused, onPr
       const isCopied = await copy(coming);
       const text = await coming;
       if (isCopied) onCopied(text); else onRefused(text);
+      // The shorter word must not move what stands beside the button.
+      button.style.minInlineSize = `${button.offsetWidth}px`;
       button.textContent = say(isCopied ? "share.copied" : "share.select");
       clearTimeout(timer);
       timer = setTimeout(() => { button.textContent = label; }, TOLD_MS);

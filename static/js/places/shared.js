@@ -18,7 +18,9 @@ export async function show(root, { id, query, life }) {
   const link = readLink(id);
   if (!link) return refuse(root, "shared.broken");
   if (link.expires_s * 1000 <= Date.now()) return refuse(root, "shared.over", { time: day(new Date(link.expires_s * 1000).toISOString()) });
-  const [source, planned] = link.files;
+  const [saved, planned] = link.files;
+  const isClear = link.offered?.includes("video.webm") ?? false;
+  const source = (isClear && link.offered) || saved;
   // Without the sign-in form: a friend has no token.
   const answer = await fetch(planned, { signal: life }).catch((error) => { throw error.name === "AbortError" ? error : unreachable(); });
   if (!answer.ok) return refuse(root, "shared.gone");
@@ -36,6 +38,7 @@ export async function show(root, { id, query, life }) {
   const onFrame = (/** @type {number} */ frame) => { time.setFrame(frame); figures?.setFrame(frame); };
   const stage = element("div.stage");
   stage.dataset.look = "film";
+  stage.classList.toggle("is-clear", isClear);
   stage.style.aspectRatio = size.join(" / ");
   stage.style.maxInlineSize = `calc(max(15rem, 100dvh - 21rem) * ${size[0] / size[1]})`;
   const shot = film({ src: source, poster: undefined, fps: plan.fps, n_frames: plan.nFrames, label: say("reel.film"), life, onFrame,
@@ -45,11 +48,11 @@ export async function show(root, { id, query, life }) {
   onFrame(startFrame ?? 0);
   if (startFrame !== null) shot.seek(startFrame);
   else if (!isCalm()) shot.play();
-  const facts = factsBox();
+  const facts = factsBox({ advises: false });
   facts.update(plan);
   root.append(
     element("header.place-head", {}, element("div", {}, element("h1", { tabIndex: -1 }, name), element("p.soft", {}, [seconds(plan.nFrames / plan.fps), size.join(" × "), say("reel.link.until", { time: day(new Date(link.expires_s * 1000).toISOString()) })].join(" · "))),
-      element("p.actions", {}, element("a.button.quiet", { href: source, download: "" }, say("shared.save")), link.offered && element("a.button.quiet", { href: link.offered, download: "" }, say("shared.save_clear")))),
+      element("p.actions", {}, link.offered && element("a.button", { href: link.offered, download: "" }, say("shared.save_clear")), element("a.button.quiet", { href: saved, download: "" }, say(link.offered ? "shared.save_opaque" : "shared.save")))),
     element("section.reel-view", { "aria-label": say("reel.watch") }, stage, element("div.stage-controls", {}, element("p.soft", {}, say("shared.what")), wholeScreen(stage, life)), time.node, figures?.node ?? ""),
     facts.node);
   return undefined;

@@ -2,7 +2,7 @@
 // @ts-check
 import { post } from "../app/api.js";
 import { element } from "../app/element.js";
-import { day, say } from "../app/words.js";
+import { day, say, sayOr } from "../app/words.js";
 import { isHere, linkTo } from "../parts/film-buttons.js";
 import { problemBox } from "../parts/problem.js";
 import { copyTextOf } from "../studio/share.js";
@@ -15,8 +15,8 @@ const PAGE = "page";
 
 /** @param {Api.Flock} flock @param {AbortSignal} life */
 export function linkMaker(flock, life) {
-  const file = element("select", {}, element("option", { value: PAGE }, say("reel.link.page")), ...filesOf(flock).map((name) => element("option", { value: name }, name)));
-  const lasting = element("select", {}, ...Object.keys(LIVES_S).map((name) => element("option", { value: name, selected: name === "day" }, say(`reel.link.${name}`))));
+  const file = element("select", {}, element("option", { value: PAGE }, say("reel.link.page")), ...filesOf(flock).map((name) => element("option", { value: name }, [name, sayOr(`reel.file.${name}`, "")].filter(Boolean).join(": "))));
+  const lasting = element("select", {}, ...Object.keys(LIVES_S).map((name) => element("option", { value: name, selected: name === "week" }, say(`reel.link.${name}`))));
   const button = element("button", { type: "submit" }, say("reel.link.make"));
   const made = element("ul.links", { "aria-live": "polite" });
   const trouble = element("div");

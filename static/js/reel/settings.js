@@ -47,6 +47,9 @@ const clearFileOf = (flock) => (flock.params.render?.background === "transparent
 /** Returns the name of the film that a person expects. @param {Api.Flock} flock */
 export const filmFileOf = (flock) => clearFileOf(flock) ?? "video.mp4";
 
+/** Returns the name of the film that a browser shows: a transparent one if it can. @param {Api.Flock} flock */
+export const shownFileOf = (flock) => (clearFileOf(flock) === OFFERED.webm ? OFFERED.webm : "video.mp4");
+
 /** Returns the names of the files that a link for friends opens. @param {Api.Flock} flock @returns {string[]} */
 export const sharedFilesOf = (flock) => [...SHARED, clearFileOf(flock) ?? ""].filter(Boolean);
 

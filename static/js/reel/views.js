@@ -6,6 +6,7 @@ import { say } from "../app/words.js";
 import { chase } from "../parts/chase.js";
 import { living } from "../parts/living.js";
 import { film } from "./film.js";
+import { shownFileOf } from "./settings.js";
 
 /** Names of the views. */
 export const VIEWS = ["film", "living"];
@@ -27,7 +28,9 @@ export function createViews({ flock, plan, size, poster, startFrame, life, onFra
   stage.style.aspectRatio = size.join(" / ");
   stage.style.maxInlineSize = `calc(max(15rem, 100dvh - 21rem) * ${size[0] / size[1]})`;
   stage.dataset.look = "film";
-  const shot = film({ src: `/v1/flocks/${flock.id}/video.mp4`, poster, fps: flock.fps, n_frames: flock.frames, label: say("reel.film"), life, ...from("film"), onBroken: () => stage.append(element("p.stage-note", {}, say("reel.broken"))) });
+  const shown = shownFileOf(flock);
+  stage.classList.toggle("is-clear", shown !== "video.mp4");
+  const shot = film({ src: `/v1/flocks/${flock.id}/${shown}`, poster, fps: flock.fps, n_frames: flock.frames, label: say("reel.film"), life, ...from("film"), onBroken: () => stage.append(element("p.stage-note", {}, say("reel.broken"))) });
   stage.append(shot.node);
   /** @type {Promise<import("../parts/living.js").Living> | null} */
   let loading = null;

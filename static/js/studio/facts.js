@@ -20,8 +20,9 @@ function sentencesOf({ head: { stats }, nIndividuals: n, isPart, nFrames, fps })
   const apart = stats.spacing_bl ?? stats.nearest_neighbor_bl;
   if (apart && n > 1) facts.push(say("facts.apart", { n: count(apart) }));
   if (stats.clone_share >= 0.005 && n > 1) facts.push(say("facts.clones", { share: percent(stats.clone_share) }));
-  if (stats.room_for) facts.push(say("facts.room", { n: stats.room_for }));
-  if (stats.room_for && n > stats.room_for) advice.push(say("advice.little_room", { n, room: stats.room_for }));
+  const room = stats.room_for;
+  if (room && n > room) advice.push(say("advice.little_room", { n, room }));
+  else if (room) facts.push(say("facts.room", { n: room }));
   if (stats.clone_share > CLONES && n > 1) advice.push(say("advice.clones", { n: stats.distinct_looks ?? n }));
   if (stats.wall_violations > 0) advice.push(say("advice.walls"));
   if (isPart) advice.push(say("advice.part", { time: count(nFrames / fps) }));
@@ -49,8 +50,8 @@ export function orderOf(plan) {
   return Array.from({ length: plan.nFrames }, (_, t) => moments[Math.floor(t / stride)]);
 }
 
-/** The box of the facts of a plan. */
-export function factsBox() {
+/** The box of the facts of a plan, with advice unless its reader cannot change the flock. */
+export function factsBox({ advises = true } = {}) {
   const sentences = element("ul.facts");
   const cards = element("ul.hints");
   const table = element("table", { translate: false, lang: "en" });
@@ -63,7 +64,7 @@ export function factsBox() {
       const { facts, advice } = sentencesOf(plan);
       const told = (plan.head.advice ?? []).map(({ sentence }) => sentence);
       sentences.replaceChildren(...facts.map((text) => element("li", {}, text)));
-      cards.replaceChildren(...[...advice, ...told].map((text) => element("li", {}, text)));
+      cards.replaceChildren(...(advises ? [...advice, ...told] : []).map((text) => element("li", {}, text)));
       const rows = Object.entries(plan.head.stats ?? {}).filter(([, value]) => typeof value === "number");
       table.replaceChildren(...rows.map(([name, value]) => element("tr", {}, element("th", { scope: "row" }, name), element("td", {}, String(Number(Number(value).toPrecision(4)))))));
     },
