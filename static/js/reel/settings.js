@@ -33,9 +33,12 @@ export function studioAddress(flock, fields) {
 /** Files by the format that makes them. */
 const OF_FORMAT = { webm: "video.webm", mov: "video.mov", png: "frames.zip", gif: "preview.gif", webp: "preview.webp", poster: "poster.png" };
 
+/** Returns the place of a file in lists: films first. @param {string} name */
+const rank = (name) => ["video.mp4", ...Object.values(OF_FORMAT), name].indexOf(name);
+
 /** Returns the names of the files of a flock, in the order of use. @param {Api.Flock} flock @returns {string[]} */
 export function filesOf(flock) {
-  if (flock.files) return flock.files.map((file) => file.name);
+  if (flock.files) return flock.files.map((file) => file.name).sort((a, b) => rank(a) - rank(b));
   const { formats = [], overlay = false, ground_truth = true } = flock.params.render ?? {};
   const wanted = Object.entries(OF_FORMAT).flatMap(([format, name]) => (formats.some((one) => one === format) ? [name] : []));
   return ["video.mp4", ...wanted, ...(overlay ? ["overlay.mp4"] : []), ...(ground_truth ? ["tracks.csv", "ground-truth.zip"] : []), "flock.json", "flock.plan", "plan.svg"];
