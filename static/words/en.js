@@ -212,7 +212,7 @@ export default {
   "reel.truth": "Ground truth over the film", "reel.truth.boxes": "Boxes", "reel.truth.shapes": "Shapes", "reel.truth.ids": "Numbers",
   "reel.truth.label": { one: "Ground truth of frame {frame}: {n} animal, {hidden} hidden in part", other: "Ground truth of frame {frame}: {n} animals, {hidden} hidden in part" },
   "reel.truth.table": "Ground truth of this frame as a table", "reel.truth.id": "Animal", "reel.truth.x_px": "x (pixels)", "reel.truth.y_px": "y (pixels)", "reel.truth.visibility": "Visible share",
-  "reel.strips": "Order of the flock over time", "reel.strip.polarization": "Agreement of headings", "reel.strip.milling": "Circling", "reel.strip.nearest_neighbor_bl": "Distance to the nearest neighbor (body lengths)",
+  "reel.strips": "Order of the flock over time", "reel.strip.polarization": "Agreement of headings", "reel.strip.milling": "Circling", "reel.strip.nearest_neighbor_bl": "Distance in space to the nearest neighbor (body lengths)",
   "reel.strip.polarization.help": "Polarization: 1 if all head the same way, 0 if their headings cancel out.", "reel.strip.milling.help": "Milling: 1 if all circle around the middle, 0 if none does.", "reel.strip.nearest_neighbor_bl.help": "Distance to the nearest other animal, a mean over all.",
   "reel.strip.means": "0 to {most}, mean {mean}", "reel.strip.now": "in this frame {value}",
   "reel.advice.short_loop": "The loop is too short for the animals to return to where they started. Choose a longer one.",

@@ -211,7 +211,7 @@ export default {
   "reel.truth": "動画に重ねる正解データ", "reel.truth.boxes": "外接長方形", "reel.truth.shapes": "マスク", "reel.truth.ids": "番号",
   "reel.truth.label": "フレーム{frame}の正解データ：{n}個体（うち{hidden}個体は一部が隠れています）",
   "reel.truth.table": "このフレームの正解データを表で見る", "reel.truth.id": "個体", "reel.truth.x_px": "x（画素）", "reel.truth.y_px": "y（画素）", "reel.truth.visibility": "見えている割合",
-  "reel.strips": "群れの秩序の時間変化", "reel.strip.polarization": "向きのそろい方", "reel.strip.milling": "旋回の強さ", "reel.strip.nearest_neighbor_bl": "最も近い個体までの距離（体長）",
+  "reel.strips": "群れの秩序の時間変化", "reel.strip.polarization": "向きのそろい方", "reel.strip.milling": "旋回の強さ", "reel.strip.nearest_neighbor_bl": "最も近い個体までの空間内の距離（体長）",
   "reel.strip.polarization.help": "整列度です。全個体が同じ向きなら1、向きが打ち消し合うと0になります。", "reel.strip.milling.help": "旋回度です。全個体が中心の周りを旋回すると1、どの個体も旋回しないと0になります。", "reel.strip.nearest_neighbor_bl.help": "最も近い個体までの距離を、全個体で平均した値です。",
   "reel.strip.means": "範囲 0〜{most}、平均 {mean}", "reel.strip.now": "このフレームでは{value}",
   "reel.advice.short_loop": "ループが短すぎるため、各個体が最初の位置に戻れません。もっと長くしてください。",
