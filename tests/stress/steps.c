@@ -6,7 +6,8 @@
  *     EIO, ENOSPC               the call, and all later ones within FAILING_MS, fail with this error
  *     delay                     the call takes DELAY_MS longer
  * CRASH_CLOCK=FILE: the clock of the process is wrong by the seconds in the file, a 64-bit integer.
- * CRASH_LOG=FILE: every sync is recorded with what it made durable, and every write to a database file.
+ * CRASH_LOG=FILE: every sync is recorded with what it made durable, and every write to a database file. Attempts at
+ *     jobs, which are processes with an empty environment, write to the same file.
  *
  * Without a step the calls are counted. CRASH_COUNT=FILE receives the number when the process ends. */
 #define _GNU_SOURCE
@@ -16,6 +17,7 @@
 #include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
+#include <spawn.h>
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -35,6 +37,9 @@ static char root[4096];
 static long wanted_step, n_steps;
 static int log_fd = -1;
 static const char *action;
+/* Variables that an attempt gets from this process. */
+static const char *const inherited[] = {"LD_PRELOAD", "CRASH_ROOT", "CRASH_LOG"};
+static char inherited_entries[3][4096];
 static int64_t failing_until_ms;
 static volatile int64_t *clock_error_s;
 
@@ -66,6 +71,7 @@ __attribute__((constructor)) static void begin(void) {
     }
     if (folder == NULL || realpath(folder, root) == NULL) root[0] = 0;
     if (step != NULL) wanted_step = atol(step);
+    for (int k = 0; log != NULL && k < 3; k++) snprintf(inherited_entries[k], sizeof inherited_entries[k], "%s=%s", inherited[k], getenv(inherited[k]));
     if (log != NULL) log_fd = open(log, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
 }
 
@@ -266,4 +272,30 @@ int mkdir(const char *path, mode_t mode) {
 int linkat(int from_folder, const char *from, int to_folder, const char *to, int flags) {
     REAL(int, "linkat", int, const char *, int, const char *, int);
     STEP(is_path_below_root(to_folder, to), real(from_folder, from, to_folder, to, flags), (void)0);
+}
+
+/* Returns the environment of a new process: an attempt at a job also gets the inherited variables. May run between
+ * fork and exec, so it allocates nothing. */
+static char **environment_of(char *const arguments[], char **given) {
+    static char *entries[64];
+    int is_attempt = 0, n = 0;
+    for (int k = 0; arguments[k] != NULL; k++) is_attempt |= strcmp(arguments[k], "attempt") == 0;
+    if (log_fd < 0 || !is_attempt) return given;
+    for (; n < 3; n++) entries[n] = inherited_entries[n];
+    for (; given != NULL && *given != NULL && n < 63; given++) entries[n++] = *given;
+    entries[n] = NULL;
+    return entries;
+}
+
+int execvp(const char *program, char *const arguments[]) {
+    REAL(int, "execvp", const char *, char *const[]);
+    environ = environment_of(arguments, environ);
+    return real(program, arguments);
+}
+
+int posix_spawnp(pid_t *pid, const char *program, const posix_spawn_file_actions_t *actions,
+                 const posix_spawnattr_t *attributes, char *const arguments[], char *const given[]) {
+    REAL(int, "posix_spawnp", pid_t *, const char *, const posix_spawn_file_actions_t *, const posix_spawnattr_t *,
+         char *const[], char *const[]);
+    return real(pid, program, actions, attributes, arguments, environment_of(arguments, (char **)given));
 }

@@ -114,7 +114,7 @@ pub(in crate::media) fn probe(
     judge(&file, &streams, &packets, decode, limits, options)
 }
 
-/// Checks a film as [`probe`] does, with the given output of ffprobe: the headers as JSON, the lines of the packets, and
+/// Checks a film as `probe` does, with the given output of ffprobe: the headers as JSON, the lines of the packets, and
 /// those of the decoded pictures. Starts no process; for fuzz targets.
 pub fn check_ffprobe_output(
     path: &Path,
