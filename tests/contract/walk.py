@@ -125,6 +125,7 @@ class Walk:
         asked = {"library_id": ids["library"], "count": 2, "frames": 10, "seed": 2}
         queued = self.call("POST /v1/flocks", body=asked).json()["job_id"]
         self.call("DELETE /v1/jobs/{id}", {"id": queued})
+        self.wait_for(queued, "cancelled")
         self.call("POST /v1/jobs/{id}/retry", {"id": queued})
         for noun, nouns in (("fish", "fish"), ("flock", "flocks"), ("library", "libraries"), ("footage", "footage")):
             self.call(f"DELETE /v1/{nouns}/{{id}}", {"id": ids[noun]})
