@@ -122,7 +122,8 @@ class Walk:
         self.call("DELETE /v1/session", cookies={name: value})
 
     def delete(self, ids):
-        asked = {"library_id": ids["library"], "count": 2, "frames": 10, "seed": 2}
+        # Long enough to be cancelled before it is done.
+        asked = {"library_id": ids["library"], "count": 50, "frames": 3000}
         queued = self.call("POST /v1/flocks", body=asked).json()["job_id"]
         self.call("DELETE /v1/jobs/{id}", {"id": queued})
         self.wait_for(queued, "cancelled")
