@@ -14,15 +14,16 @@ use sha1::Sha1;
 use sha2::Sha256;
 use sha2::digest::DynDigest;
 use tokio::time::timeout;
+use tracing::Instrument;
 use uuid::Uuid;
 
 use super::AppState;
 use super::extract::{Access, Id};
 use super::problem::{Answer, Problem, ProblemBody};
 use super::receive::{CHECK_EVERY_BYTES, CHUNK_TIMEOUT, code_of_broken_body, label};
-use crate::jobs::IdSequence;
 use crate::jobs::admit::ReceivedFiles;
 use crate::jobs::clock::now_ms;
+use crate::jobs::{Error, IdSequence};
 use crate::store::footage::Added;
 use crate::store::owners::OwnerFilter;
 use crate::store::space::Counted;
@@ -34,8 +35,8 @@ const RESUMABLE: HeaderName = HeaderName::from_static("tus-resumable");
 const OFFSET: HeaderName = HeaderName::from_static("upload-offset");
 const LENGTH: HeaderName = HeaderName::from_static("upload-length");
 const CHUNK_MEDIA_TYPE: &str = "application/offset+octet-stream";
-/// Bytes between two syncs, the most that a crash loses. A request with a checksum is synced only at its end.
-const SYNC_EVERY_BYTES: i64 = CHECK_EVERY_BYTES as i64;
+/// Number of bytes after which the free disk is checked again.
+const CHECK_BYTES: i64 = CHECK_EVERY_BYTES as i64;
 
 /// Middleware: adds the tus version to responses below /v1/uploads, and refuses requests of other versions.
 pub(super) async fn tus_version(request: Request, next: Next) -> Response<Body> {
@@ -109,7 +110,7 @@ pub(super) async fn create_upload(access: Access, mut ids: IdSequence, request: 
     }
     store.create_upload(&upload).await?;
     let upload = if is_chunk(headers) {
-        receive_chunk(&access.state, &lock, upload, request).await?
+        in_task(receive_chunk(access.state, lock, upload, request)).await?
     } else {
         upload
     };
@@ -126,8 +127,7 @@ pub(super) async fn head_upload(access: Access, Id(id): Id) -> Answer {
     let lock = access.store().lock_upload(id).await;
     let upload = find(&access, id).await?;
     // The process may have ended after the last byte, before the upload became footage.
-    let upload = finish_if_complete(&access.state, upload).await?;
-    drop(lock);
+    let upload = in_task(finish_if_complete(access.state, lock, upload)).await?;
     Ok((StatusCode::OK, status_headers(&upload)).into_response())
 }
 
@@ -156,7 +156,7 @@ pub(super) async fn patch_upload(access: Access, Id(id): Id, request: Request) -
         let sentence = format!("the stored offset is {} bytes", upload.offset_bytes);
         return Err(Problem::new(Code::OffsetDiffers, sentence));
     }
-    let upload = receive_chunk(&access.state, &lock, upload, request).await?;
+    let upload = in_task(receive_chunk(access.state, lock, upload, request)).await?;
     Ok((StatusCode::NO_CONTENT, status_headers(&upload)).into_response())
 }
 
@@ -179,11 +179,19 @@ async fn find(access: &Access, id: Uuid) -> Result<Upload, Problem> {
     upload.ok_or_else(Problem::not_found)
 }
 
+/// Runs work in its own task, so that a client that disconnects cannot interrupt it halfway.
+async fn in_task(
+    work: impl Future<Output = Result<Upload, Problem>> + Send + 'static,
+) -> Result<Upload, Problem> {
+    let done = tokio::spawn(work.in_current_span()).await;
+    done.unwrap_or_else(|_panic| Err(Error::Panicked.into()))
+}
+
 /// Appends the body of a request to an upload, and turns a complete upload into footage. If the body is cut
 /// off, the bytes received so far are kept, unless the request has a checksum.
 async fn receive_chunk(
-    state: &AppState,
-    lock: &UploadLock,
+    state: AppState,
+    lock: UploadLock,
     mut upload: Upload,
     request: Request,
 ) -> Result<Upload, Problem> {
@@ -193,46 +201,40 @@ async fn receive_chunk(
     if upload.footage_id.is_some() {
         return Ok(upload);
     }
-    let mut file = store.open_upload_file(&upload).await?;
-    let mut received_bytes = upload.offset_bytes;
+    let mut writer = store.open_upload(&upload).await?;
     let ended = loop {
-        let bytes = match next_bytes(&mut body, lock).await {
+        let bytes = match next_bytes(&mut body, &lock).await {
             Ok(Some(bytes)) => bytes,
             Ok(None) => break Ok(()),
             Err(problem) => break Err(problem),
         };
-        received_bytes += bytes.len() as i64;
-        if received_bytes > upload.size_bytes {
-            received_bytes -= bytes.len() as i64;
+        let before = upload.offset_bytes + writer.n_bytes();
+        let after = before + bytes.len() as i64;
+        if after > upload.size_bytes {
             break Err(Code::TooLarge.into());
         }
         // Other requests fill the disk too, so the free space is checked again from time to time.
-        let before = received_bytes - bytes.len() as i64;
-        if before / SYNC_EVERY_BYTES != received_bytes / SYNC_EVERY_BYTES
+        if before / CHECK_BYTES != after / CHECK_BYTES
             && let Err(error) = store.check_disk(0)
         {
-            received_bytes = before;
             break Err(error.into());
         }
-        file.append(&bytes).await?;
         if let Some(checksum) = &mut checksum {
             checksum.hasher.update(&bytes);
-        } else if received_bytes - upload.offset_bytes >= SYNC_EVERY_BYTES {
-            file.sync().await?;
-            upload.offset_bytes = received_bytes;
-            store.record_upload_offset(&upload).await?;
+        }
+        writer.append(&upload, bytes).await?;
+        // A body with a checksum is confirmed only as a whole.
+        if checksum.is_none() && writer.is_due() {
+            writer.confirm(&mut upload, now_ms()).await?;
         }
     };
     if let Some(checksum) = checksum {
         ended.clone()?;
         checksum.verify()?;
     }
-    file.sync().await?;
-    upload.offset_bytes = received_bytes;
-    upload.expires_ms = now_ms() + LIFETIME_MS;
-    store.record_upload_offset(&upload).await?;
+    writer.confirm(&mut upload, now_ms()).await?;
     ended?;
-    finish_if_complete(state, upload).await
+    finish_if_complete(state, lock, upload).await
 }
 
 async fn next_bytes(
@@ -254,12 +256,25 @@ async fn next_bytes(
 
 /// Turns a complete upload into footage. An incomplete one is returned unchanged. If the video is refused,
 /// the upload is deleted; after a transient error it is kept.
-async fn finish_if_complete(state: &AppState, mut upload: Upload) -> Result<Upload, Problem> {
+async fn finish_if_complete(
+    state: AppState,
+    _lock: UploadLock,
+    mut upload: Upload,
+) -> Result<Upload, Problem> {
     if upload.offset_bytes < upload.size_bytes || upload.footage_id.is_some() {
         return Ok(upload);
     }
     let store = &state.context.store;
-    let (draft, video) = store.draft_of_upload(&upload).await?;
+    let (draft, video) = match store.draft_of_upload(&upload).await {
+        Ok(complete) => complete,
+        Err(error) => {
+            // Another instance of the service may have finished the upload, and removed its bytes.
+            let owners = OwnerFilter::One(upload.owner);
+            let upload = store.upload(upload.id, &owners, now_ms()).await?;
+            let finished = upload.filter(|upload| upload.footage_id.is_some());
+            return finished.ok_or(error.into());
+        }
+    };
     let received = ReceivedFiles {
         draft,
         video,
@@ -269,7 +284,7 @@ async fn finish_if_complete(state: &AppState, mut upload: Upload) -> Result<Uplo
         owner: upload.owner.clone(),
         counted: Counted::Upload(upload.id),
     };
-    match super::footage::admit(state, received).await {
+    match super::footage::admit(&state, received).await {
         Ok(Added::New(footage) | Added::Known(footage)) => {
             store.finish_upload(&upload, footage.id).await?;
             upload.footage_id = Some(footage.id);

@@ -66,9 +66,17 @@ impl Store {
         Ok(broken.chain(lost).collect())
     }
 
-    /// Checks I1 for unfinished uploads: the file holds all bytes that were confirmed to the sender. Skipped
-    /// for a shared database, whose upload files may be on other machines.
+    /// Checks I1 for unfinished uploads: the file holds all bytes that were confirmed to the sender, or the parts
+    /// in the bucket do. Skipped for files beside a shared database, which may be on other machines.
     async fn short_uploads(&self) -> Result<Vec<Fault>, Error> {
+        if self.blobs.are_in_bucket() {
+            let differing = sql::query_scalar(WRONG_OFFSETS).fetch_all(&self.reader);
+            let uploads: Vec<Uuid> = differing.await?;
+            let said = |id| {
+                format!("I1: the recorded offset differs from the sum of the parts: uploads/{id}")
+            };
+            return Ok(uploads.into_iter().map(said).collect());
+        }
         if !self.reader.is_file() {
             return Ok(Vec::new());
         }
@@ -97,10 +105,14 @@ impl Store {
                 size_bytes,
                 sha256,
             };
-            match self.blobs.is_intact(&file, &folder).await {
-                Ok(true) => {}
-                Ok(false) => faults.push(format!("I1: altered: {folder}/{}", file.name)),
-                Err(error) => faults.push(format!("I1: {error}: {folder}/{}", file.name)),
+            let fault = match self.blobs.is_intact(&file, &folder).await {
+                Ok(true) => continue,
+                Ok(false) => format!("I1: altered: {folder}/{}", file.name),
+                Err(error) => format!("I1: {error}: {folder}/{}", file.name),
+            };
+            // Another process may have deleted it, or made footage of an upload and removed its parts.
+            if self.blob(&folder, &file.name).await?.is_some() {
+                faults.push(fault);
             }
         }
         Ok(faults)
@@ -132,6 +144,10 @@ const WRONG_SIZES: &str = "select r.folder from ( \
          select folder, size_bytes from fish) r \
          where r.size_bytes != ( \
          select coalesce(sum(b.size_bytes), -1) from blobs b where b.folder = r.folder)";
+
+/// Query for I1: unfinished uploads whose offset differs from the sum of their parts' sizes.
+const WRONG_OFFSETS: &str = "select id from uploads u where footage_id is null and offset_bytes != ( \
+         select coalesce(sum(b.size_bytes), 0) from blobs b where b.folder = 'uploads/' || lower(hex(u.id)))";
 
 #[cfg(test)]
 mod tests {

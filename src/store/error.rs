@@ -64,6 +64,11 @@ pub enum Error {
         /// The maximum, bytes.
         limit_bytes: u64,
     },
+    /// Another request, perhaps at another instance of the service, has added bytes to the upload or ended it.
+    #[error(
+        "another request has changed the upload: read its offset with HEAD, and continue from there"
+    )]
+    UploadChanged,
     /// The video that a sample job made is already stored under another id.
     #[error("the same film was stored by an upload while this job ran")]
     AlreadyStored,
@@ -129,6 +134,7 @@ impl Error {
         match self {
             Error::IdInUse(_) => Code::IdempotencyKeyReused,
             Error::TooLarge { .. } => Code::TooLarge,
+            Error::UploadChanged => Code::OffsetDiffers,
             Error::AlreadyStored => Code::AlreadyStored,
             Error::QuotaExceeded { .. } => Code::QuotaExceeded,
             Error::QueueFull { .. } => Code::QueueFull,

@@ -22,7 +22,7 @@ const FLUSHED_BYTES: u64 = 32 << 20;
 
 /// One file that is being received into a draft.
 pub struct Intake {
-    name: &'static str,
+    name: String,
     size_bytes: u64,
     limit_bytes: u64,
     pieces: Vec<Bytes>,
@@ -44,10 +44,11 @@ impl Intake {
     /// Creates the file `name` in the draft. The file accepts at most `limit_bytes`.
     pub async fn create(
         draft: &Draft,
-        name: &'static str,
+        name: impl Into<String>,
         limit_bytes: u64,
     ) -> Result<Intake, Error> {
-        let file = tokio::fs::File::create_new(draft.path().join(name)).await?;
+        let name = name.into();
+        let file = tokio::fs::File::create_new(draft.path().join(&name)).await?;
         let writer = Writer {
             file: Arc::new(file.into_std().await),
             hasher: Sha256::new(),
@@ -115,7 +116,7 @@ impl Intake {
             .await
             .map_err(io::Error::other)??;
         Ok(BlobFile {
-            name: self.name.to_owned(),
+            name: self.name,
             size_bytes: self.size_bytes as i64,
             sha256: hasher.finalize().to_vec(),
         })

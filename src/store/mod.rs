@@ -14,6 +14,7 @@ pub mod idempotency;
 pub mod intake;
 pub mod jobs;
 pub mod owners;
+mod parts;
 pub mod resources;
 pub mod space;
 pub mod spill;

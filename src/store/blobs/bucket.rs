@@ -1,6 +1,6 @@
 //! Files in an S3-compatible bucket. Address and keys are in the usual `AWS_*` variables; the keys may be in the file
-//! of `AWS_SHARED_CREDENTIALS_FILE`, as secrets of containers are. Uploads in parts
-//! use parts of equal size and are aborted on failure. A part left by a crash costs money until a rule of the
+//! of `AWS_SHARED_CREDENTIALS_FILE`, as secrets of containers are. Multipart uploads
+//! use pieces of equal size and are aborted on failure. A piece left by a crash costs money until a rule of the
 //! bucket removes it.
 
 use std::collections::BTreeMap;
@@ -19,13 +19,13 @@ use tokio::fs::File;
 use tokio::io::{AsyncWriteExt, BufReader};
 use tokio::time::timeout;
 
-use super::Folder;
+use super::{Folder, UPLOADS};
 use crate::store::resources::ResourceKind;
 use crate::store::{Error, tls};
 
-/// Size of every part except the last, bytes. It exceeds the minimum of every provider, and some require
+/// Size of every piece except the last, bytes. It exceeds the minimum of every provider, and some require
 /// equal sizes.
-const PART_BYTES: usize = 16 << 20;
+const PIECE_BYTES: usize = 16 << 20;
 /// Size of one read request, bytes. Short requests do not stay open while a client downloads slowly.
 const READ_BYTES: u64 = 4 << 20;
 
@@ -115,7 +115,7 @@ impl Bucket {
         while let Some(entry) = entries.next_entry().await? {
             let name = entry.file_name().to_string_lossy().into_owned();
             let path = self.path(&format!("{folder}/{name}"));
-            let writer = BufWriter::with_capacity(self.store.clone(), path, PART_BYTES);
+            let writer = BufWriter::with_capacity(self.store.clone(), path, PIECE_BYTES);
             let mut writer = writer.with_max_concurrency(2);
             copy(&entry.path(), &mut writer).await?;
         }
@@ -127,6 +127,11 @@ impl Bucket {
         let paths = objects.map_ok(|object| object.location).boxed();
         let deleted = self.store.delete_stream(paths);
         Ok(deleted.try_for_each(async |_| Ok(())).await?)
+    }
+
+    pub(super) async fn discard_file(&self, folder: &str, name: &str) -> Result<(), Error> {
+        let path = self.path(&format!("{folder}/{name}"));
+        Ok(self.store.delete(&path).await?)
     }
 
     pub(super) async fn size_bytes(&self, folder: &str, name: &str) -> Result<u64, Error> {
@@ -203,7 +208,7 @@ impl Bucket {
         let (folder, _name) = path.trim_start_matches('/').rsplit_once('/')?;
         let (kind, _) = folder.split_once('/')?;
         let mut kinds = ResourceKind::ALL.iter();
-        let is_ours = kinds.any(|known| known.plural() == kind);
+        let is_ours = kind == UPLOADS || kinds.any(|known| known.plural() == kind);
         is_ours.then(|| folder.to_owned())
     }
 

@@ -22,6 +22,7 @@ use bytes::Bytes;
 use futures_util::stream::BoxStream;
 use futures_util::{Stream, TryStreamExt};
 use sha2::{Digest, Sha256};
+use sqlx::types::Uuid;
 use tokio::io::{AsyncWrite, AsyncWriteExt};
 
 pub use draft::Draft;
@@ -36,6 +37,8 @@ use flockreel_core::code::Code;
 
 /// Name of the file that holds the mark of the files (`identity`).
 const MARK: &str = "store-id";
+/// Name of the folder of unfinished uploads: their files on this machine, or their parts in a bucket (`parts`).
+pub(super) const UPLOADS: &str = "uploads";
 
 /// One stored file.
 #[derive(Clone, Debug, PartialEq, Eq, sqlx::FromRow)]
@@ -84,7 +87,7 @@ pub struct Fetched {
 
 impl Blobs {
     pub(super) async fn open(storage: &Storage) -> Result<Blobs, Error> {
-        let uploads = storage.data.join("uploads");
+        let uploads = storage.data.join(UPLOADS);
         fs::create_dir_all(&uploads).map_err(Error::at(&uploads))?;
         let open_local = |folder: &Path| match LocalFolder::open(folder) {
             Ok(local) => Ok(Backend::Local(local)),
@@ -129,6 +132,19 @@ impl Blobs {
         match &self.backend {
             Backend::Local(local) => local.adopt(draft, folder).await,
             Backend::Bucket(bucket) => bucket.put(draft.path(), folder).await,
+        }
+    }
+
+    /// Returns whether the files are in a bucket, which every instance of the service reads and writes.
+    pub(super) fn are_in_bucket(&self) -> bool {
+        matches!(self.backend, Backend::Bucket(_))
+    }
+
+    /// Removes a part of an upload, which no row names. Only buckets have parts.
+    pub(super) async fn discard_part(&self, folder: &str, name: &str) -> Result<(), Error> {
+        match &self.backend {
+            Backend::Local(_) => Ok(()),
+            Backend::Bucket(bucket) => bucket.discard_file(folder, name).await,
         }
     }
 
@@ -203,16 +219,6 @@ impl Blobs {
     }
 }
 
-impl Backend {
-    /// Returns whether the location answers. A local folder always does.
-    async fn answers(&self) -> bool {
-        match self {
-            Backend::Local(_) => true,
-            Backend::Bucket(bucket) => bucket.answers().await,
-        }
-    }
-}
-
 impl Fetched {
     /// Returns the folder of the files.
     pub fn path(&self) -> &Path {
@@ -247,7 +253,7 @@ impl Store {
             }
             Backend::Bucket(bucket) => bucket,
         };
-        let draft = self.blobs.draft(&sqlx::types::Uuid::now_v7().to_string())?;
+        let draft = self.blobs.draft(&Uuid::now_v7().to_string())?;
         for name in names {
             let Some(blob) = self.blob(folder, name).await? else {
                 continue;
@@ -264,10 +270,16 @@ impl Store {
         })
     }
 
-    /// Returns whether a row names the folder.
+    /// Returns whether a row names the folder. The row of an open upload names the folder of its parts, also of
+    /// those to come.
     pub async fn is_folder_known(&self, folder: &str) -> Result<bool, Error> {
-        let sql = "select exists (select 1 from blobs where folder = $1)";
-        let known = sql::query_scalar(sql).bind(folder);
+        let sql = "select exists (select 1 from blobs where folder = $1 union all \
+                   select 1 from uploads where id = $2 and footage_id is null)";
+        let upload = folder
+            .strip_prefix(UPLOADS)
+            .and_then(|id| id.strip_prefix('/'));
+        let upload: Option<Uuid> = upload.and_then(|id| id.parse().ok());
+        let known = sql::query_scalar(sql).bind(folder).bind(upload);
         Ok(known.fetch_one(&self.reader).await?)
     }
 

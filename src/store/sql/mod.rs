@@ -28,12 +28,14 @@ const ROW_LOCKS: [&str; 3] = [
 ];
 
 /// A statement with its parameters.
+#[derive(Clone)]
 pub(super) struct Query {
     sql: Cow<'static, str>,
     values: Vec<Value>,
 }
 
 /// A statement whose rows have one column.
+#[derive(Clone)]
 pub(super) struct ScalarQuery(Query);
 
 /// Returns a statement without parameters. The first bound value becomes `$1`.

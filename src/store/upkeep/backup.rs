@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 use sqlx::types::Uuid;
 
+use crate::store::blobs::UPLOADS;
 use crate::store::sql::{self, Pool};
 use crate::store::{BlobFile, Error, Store};
 
@@ -58,7 +59,11 @@ impl Store {
         if database.exists() {
             fs::remove_file(database)?;
         }
-        self.writer.copy_to(database).await
+        let snapshot = self.writer.copy_to(database).await?;
+        // In the copy, every unfinished upload is one file.
+        let parts = format!("delete from blobs where folder like '{UPLOADS}/%'");
+        sql::query(parts).execute(&snapshot).await?;
+        Ok(snapshot)
     }
 
     /// Copies the files that the rows of the snapshot name. Returns false if one of them no longer exists.
@@ -89,12 +94,20 @@ impl Store {
         let sql = "select id, offset_bytes from uploads where footage_id is null order by id";
         let uploads: Vec<(Uuid, i64)> = sql::query(sql).fetch_all(snapshot).await?;
         for (id, offset_bytes) in uploads {
-            let to = partial.join("uploads");
-            let Some(n_bytes) = copy_prefix(&self.upload_path(id), &to, offset_bytes)? else {
-                return Ok(false);
+            let to = partial.join(UPLOADS);
+            fs::create_dir_all(&to)?;
+            let to = to.join(id.to_string());
+            let n_bytes = if self.blobs.are_in_bucket() {
+                self.join_parts(id, &to).await?
+            } else {
+                copy_prefix(&self.upload_path(id), &to, offset_bytes)?
             };
+            if n_bytes.is_none_or(|n_bytes| n_bytes < offset_bytes) {
+                return Ok(false);
+            }
+            File::open(to)?.sync_all()?;
             copied.n_files += 1;
-            copied.n_bytes += n_bytes;
+            copied.n_bytes += offset_bytes.unsigned_abs();
         }
         Ok(true)
     }
@@ -137,17 +150,15 @@ fn partial_path(target: &Path) -> PathBuf {
 }
 
 /// Copies the synced bytes of an unfinished upload; later bytes may still change. Returns the number of
-/// bytes, or `None` if the file is missing or too short.
-fn copy_prefix(from: &Path, folder: &Path, n_bytes: i64) -> io::Result<Option<u64>> {
+/// bytes, or `None` if the file is missing.
+fn copy_prefix(from: &Path, to: &Path, n_bytes: i64) -> io::Result<Option<i64>> {
     let source = match File::open(from) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         source => source?,
     };
-    fs::create_dir_all(folder)?;
-    let mut target = File::create(folder.join(from.file_name().unwrap_or_default()))?;
-    let n_copied = io::copy(&mut source.take(n_bytes.unsigned_abs()), &mut target)?;
-    target.sync_all()?;
-    Ok((n_copied == n_bytes.unsigned_abs()).then_some(n_copied))
+    let mut source = source.take(n_bytes.unsigned_abs());
+    let n_copied = io::copy(&mut source, &mut File::create(to)?)?;
+    Ok(Some(n_copied.cast_signed()))
 }
 
 /// Returns running jobs to the queue, as a release does.

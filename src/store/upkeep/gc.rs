@@ -1,7 +1,6 @@
 //! Removal of data that nothing refers to and of data that is too old, counted first, for `flockreel gc`
 //! (docs/explanation/promises.md, "No orphans" and "Limited space"). Unfinished work of running processes is kept.
 
-use std::fs;
 use std::time::SystemTime;
 
 use crate::config::Retention;
@@ -41,14 +40,12 @@ impl Store {
             waste.n_folders += 1;
             waste.n_bytes += folder.n_bytes;
         }
-        let sql = "select id from uploads where expires_ms <= $1";
+        let sql = "select case when footage_id is null then offset_bytes else 0 end from uploads \
+                   where expires_ms <= $1";
         let expired = sql::query_scalar(sql).bind(now_ms);
-        for id in expired.fetch_all(&self.reader).await? {
-            waste.n_uploads += 1;
-            // The file may be on another machine.
-            let file = fs::metadata(self.upload_path(id));
-            waste.n_bytes += file.map_or(0, |file| file.len());
-        }
+        let expired: Vec<i64> = expired.fetch_all(&self.reader).await?;
+        waste.n_uploads = expired.len();
+        waste.n_bytes += expired.iter().sum::<i64>().unsigned_abs();
         for (sql, until_ms) in [
             (
                 "select count(*) from sessions where expires_ms <= $1",
@@ -105,6 +102,7 @@ impl Store {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
     use std::time::Duration;
 
     use super::*;

@@ -191,6 +191,6 @@ async fn creating_an_upload_is_idempotent() {
         code_of(begin(10).await, 422).await,
         "idempotency_key_reused"
     );
-    assert_eq!(app.n_uploads(), 1);
+    assert_eq!(app.n_uploads().await, 1);
     app.assert_sound().await;
 }

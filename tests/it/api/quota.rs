@@ -11,11 +11,11 @@ use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 
-use crate::common::TestApp;
 use crate::common::app::code_of;
 use crate::common::clip::SWIM;
 use crate::common::process::numbered_film;
 use crate::common::results::Results;
+use crate::common::{Place, TestApp};
 
 /// Longest wait for an effect that follows a response. Free choice.
 const MAX_WAIT: Duration = Duration::from_secs(30);
@@ -255,15 +255,11 @@ async fn announced_uploads_may_not_exceed_the_free_disk() {
     // Two of these uploads leave the reserve free, with room for what other programs write and delete meanwhile.
     let n_bytes = n_free / 8;
     let reserve = (n_free - n_bytes * 5 / 2).to_string();
-    let app = TestApp::start(&[
-        "--max-owner-bytes",
-        "0",
-        "--max-upload-bytes",
-        &n_free.to_string(),
-        "--disk-reserve-bytes",
-        &reserve,
-    ])
-    .await;
+    let n_free = n_free.to_string();
+    let flags = ["--max-owner-bytes", "0", "--max-upload-bytes", &n_free];
+    let flags = [&flags[..], &["--disk-reserve-bytes", &reserve]].concat();
+    // Uploads to a bucket do not take the disk of the service.
+    let app = TestApp::on(Place::with_files_in_folder(), &flags).await;
     let first = path_of(&announce(&app, n_bytes).await);
     path_of(&announce(&app, n_bytes).await);
     let refused = announce(&app, n_bytes).await;

@@ -9,6 +9,7 @@ use flockreel::config::Config;
 use flockreel::jobs::Context;
 use flockreel::jobs::clock::now_ms;
 use flockreel::jobs::supervisor::Supervisor;
+use flockreel::store::owners::Owner;
 use flockreel::store::tokens::{NewToken, Scope};
 use reqwest::header::{self, HeaderMap};
 use reqwest::multipart::Form;
@@ -23,7 +24,7 @@ use super::{Place, client};
 pub(crate) struct TestApp {
     pub(crate) context: Context,
     pub(crate) client: Client,
-    base: String,
+    pub(crate) base: String,
     place: Place,
     stop: CancellationToken,
     supervisor: Option<Supervisor>,
@@ -184,8 +185,12 @@ impl TestApp {
         self.place.n_drafts()
     }
 
-    /// Returns the number of files of unfinished uploads.
-    pub(crate) fn n_uploads(&self) -> usize {
+    /// Returns the number of unfinished uploads: of their files, or of their rows if their bytes are in a bucket.
+    pub(crate) async fn n_uploads(&self) -> usize {
+        if self.place.has_bucket() {
+            let usage = self.context.store.usage(&Owner::local()).await;
+            return usage.unwrap().uploads.n.try_into().unwrap();
+        }
         self.place.n_uploads()
     }
 

@@ -8,6 +8,7 @@ pub(crate) mod place;
 pub(crate) mod process;
 pub(crate) mod results;
 pub(crate) mod substitute;
+pub(crate) mod tus;
 
 pub(crate) use app::TestApp;
 pub(crate) use place::Place;

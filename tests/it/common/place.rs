@@ -43,6 +43,11 @@ impl Place {
         self.flags.get(at + 1).map(String::as_str)
     }
 
+    /// Returns whether the files are in a bucket.
+    pub(crate) fn has_bucket(&self) -> bool {
+        self.flags.iter().any(|flag| flag == "--store")
+    }
+
     /// Returns a place on the servers. Panics if the environment does not name both.
     pub(crate) fn shared() -> Place {
         let place = Place::from_environment();

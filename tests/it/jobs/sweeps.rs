@@ -46,12 +46,12 @@ async fn running_service_removes_only_expired_data() {
     context.sweep_every = Duration::from_millis(20);
     let supervisor = Supervisor::start(context, 0);
     let begun = Instant::now();
-    while app.n_uploads() > 1 || old_folder.exists() {
+    while app.n_uploads().await > 1 || old_folder.exists() {
         assert!(begun.elapsed() < Duration::from_secs(20), "nothing swept");
         tokio::time::sleep(Duration::from_millis(20)).await;
     }
     supervisor.drain().await;
-    assert_eq!(app.n_uploads(), 1);
+    assert_eq!(app.n_uploads().await, 1);
     // Look the keys up as of a time at which neither has expired: only the young one is still stored.
     let store = &app.context.store;
     let then_ms = now_ms() - ANSWER_LIFETIME_MS;

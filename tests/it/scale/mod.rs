@@ -3,4 +3,5 @@
 
 mod machines;
 mod stall;
+mod uploads;
 mod watched;

@@ -67,13 +67,13 @@ async fn service_reports_an_unreachable_bucket_within_seconds() {
 }
 
 /// A TCP proxy to the bucket. While blocked, it neither answers nor refuses connections.
-struct Wire {
-    url: String,
-    open: watch::Sender<bool>,
+pub(super) struct Wire {
+    pub(super) url: String,
+    pub(super) open: watch::Sender<bool>,
 }
 
 impl Wire {
-    async fn to(url: &str) -> Wire {
+    pub(super) async fn to(url: &str) -> Wire {
         let (scheme, address) = url.split_once("://").unwrap();
         let address = address.to_owned();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
