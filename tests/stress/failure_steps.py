@@ -1,5 +1,6 @@
-"""Lets the steps of a service that change its data fail, one at a time (docs/explanation/promises.md, "Failure
-steps"). The process dies before or after the step, the step and those after it fail for a moment, or it is slow.
+"""Lets the steps of a service and of its attempts at jobs that change data fail, one at a time
+(docs/explanation/promises.md, "Failure steps"). The process of the step, which is the service or an attempt, dies
+before or after it, the step and those after it fail for a moment, or it is slow.
 Then what was answered must be there, all jobs must end, and the service must work, after a failed call without a
 restart.
 
@@ -11,6 +12,7 @@ import itertools
 import json
 import random
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -23,6 +25,8 @@ from scenario import Client, Service, compile_steps, ended, make_film
 ACTIONS = ("kill-before", "kill-after", "EIO", "ENOSPC", "delay")
 #: A dead worker's job waits for the end of its lease, 15 s, without using the processor.
 N_AT_ONCE = 4
+#: The file in which steps.c counts: steps, and the time until which they fail.
+COUNT = struct.Struct("=qq")
 #: Time in which the service works again once calls no longer fail, seconds (promise "Full disk"), and a margin for
 #: machines that are busy.
 RECOVERY_S = 2 + 8
@@ -57,10 +61,11 @@ class Walk:
             assert service.is_ready()
         shutil.copytree(folder / "start", folder / "whole")
         count = folder / "count"
+        count.write_bytes(COUNT.pack(0, 0))
         with Service(program, folder / "whole", self.library, CRASH_COUNT=str(count)) as service:
             assert service.is_ready()
             Client(service, self.film).run()
-        self.n_steps = int(count.read_text())
+        self.n_steps, _ = COUNT.unpack(count.read_bytes())
 
     def fails(self, step, action):
         """Runs one case and prints its faults."""
@@ -74,7 +79,10 @@ class Walk:
 
     def run(self, data, step, action):
         facts, faults = [], []
-        with Service(self.program, data, self.library, CRASH_STEP=str(step), CRASH_ACTION=action) as service:
+        count = data.with_suffix(".count")
+        count.write_bytes(COUNT.pack(0, 0))
+        variables = {"CRASH_STEP": str(step), "CRASH_ACTION": action, "CRASH_COUNT": str(count)}
+        with Service(self.program, data, self.library, **variables) as service:
             if service.is_ready():
                 client = Client(service, self.film)
                 client.run()

@@ -1,15 +1,16 @@
 /* Stands between the service and the C library (LD_PRELOAD) and sees every call that changes files below
  * CRASH_ROOT. It does what these variables ask for.
  *
- * CRASH_STEP=N, CRASH_ACTION=...: the Nth of these calls of the process is a failure step.
- *     kill-before, kill-after   the process dies before or after the call
+ * CRASH_STEP=N, CRASH_ACTION=...: the Nth of these calls is a failure step.
+ *     kill-before, kill-after   the process that calls dies before or after the call
  *     EIO, ENOSPC               the call, and all later ones within FAILING_MS, fail with this error
  *     delay                     the call takes DELAY_MS longer
  * CRASH_CLOCK=FILE: the clock of the process is wrong by the seconds in the file, a 64-bit integer.
- * CRASH_LOG=FILE: every sync is recorded with what it made durable, and every write to a database file. Attempts at
- *     jobs, which are processes with an empty environment, write to the same file.
+ * CRASH_LOG=FILE: every sync is recorded with what it made durable, and every write to a database file.
+ * CRASH_COUNT=FILE: the calls are counted in this file, a struct of two 64-bit integers (`count`).
  *
- * Without a step the calls are counted. CRASH_COUNT=FILE receives the number when the process ends. */
+ * The service and its attempts at jobs share the log and the count. Attempts are processes with an empty
+ * environment, so the library passes the variables on. */
 #define _GNU_SOURCE
 #include <dirent.h>
 #include <dlfcn.h>
@@ -34,14 +35,19 @@ enum { FAILING_MS = 300, DELAY_MS = 1500 };
 
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static char root[4096];
-static long wanted_step, n_steps;
+static int64_t wanted_step;
 static int log_fd = -1;
 static const char *action;
-/* Variables that an attempt gets from this process. */
-static const char *const inherited[] = {"LD_PRELOAD", "CRASH_ROOT", "CRASH_LOG"};
-static char inherited_entries[3][4096];
-static int64_t failing_until_ms;
+/* Variables that an attempt gets from this process, if this process has them. */
+enum { N_INHERITED = 6 };
+static const char *const inherited[N_INHERITED] = {"LD_PRELOAD",  "CRASH_ROOT", "CRASH_LOG",
+                                                   "CRASH_STEP", "CRASH_ACTION", "CRASH_COUNT"};
+static char inherited_entries[N_INHERITED][4096];
 static volatile int64_t *clock_error_s;
+/* Calls so far, and the time of the monotonic clock until which calls fail. */
+static struct count { int64_t n_steps, failing_until_ms; } own_count, *count = &own_count;
+/* Whether this thread is in the failure step. */
+static __thread int is_wanted;
 
 typedef int clock_call(clockid_t, struct timespec *);
 
@@ -59,28 +65,28 @@ static int64_t now_ns(clockid_t clock) {
     return now.tv_sec * 1000000000LL + now.tv_nsec;
 }
 
+/* Maps the begin of a file; NULL if there is none. */
+static void *shared(const char *path, int mode, size_t n_bytes) {
+    int fd = path == NULL ? -1 : open(path, mode | O_CLOEXEC);
+    if (fd < 0) return NULL;
+    void *begin = mmap(NULL, n_bytes, mode == O_RDWR ? PROT_READ | PROT_WRITE : PROT_READ, MAP_SHARED, fd, 0);
+    close(fd);
+    return begin == MAP_FAILED ? NULL : begin;
+}
+
 __attribute__((constructor)) static void begin(void) {
     const char *folder = getenv("CRASH_ROOT"), *step = getenv("CRASH_STEP"), *log = getenv("CRASH_LOG");
     action = getenv("CRASH_ACTION");
-    const char *clock = getenv("CRASH_CLOCK");
-    int fd = clock == NULL ? -1 : open(clock, O_RDONLY | O_CLOEXEC);
-    if (fd >= 0) {
-        void *error = mmap(NULL, sizeof *clock_error_s, PROT_READ, MAP_SHARED, fd, 0);
-        if (error != MAP_FAILED) clock_error_s = error;
-        close(fd);
-    }
+    clock_error_s = shared(getenv("CRASH_CLOCK"), O_RDONLY, sizeof *clock_error_s);
+    struct count *shared_count = shared(getenv("CRASH_COUNT"), O_RDWR, sizeof *count);
+    if (shared_count != NULL) count = shared_count;
     if (folder == NULL || realpath(folder, root) == NULL) root[0] = 0;
     if (step != NULL) wanted_step = atol(step);
-    for (int k = 0; log != NULL && k < 3; k++) snprintf(inherited_entries[k], sizeof inherited_entries[k], "%s=%s", inherited[k], getenv(inherited[k]));
+    for (int k = 0; k < N_INHERITED; k++) {
+        const char *value = getenv(inherited[k]);
+        if (value != NULL) snprintf(inherited_entries[k], sizeof inherited_entries[k], "%s=%s", inherited[k], value);
+    }
     if (log != NULL) log_fd = open(log, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
-}
-
-__attribute__((destructor)) static void end(void) {
-    const char *path = getenv("CRASH_COUNT");
-    FILE *file = path == NULL ? NULL : fopen(path, "w");
-    if (file == NULL) return;
-    fprintf(file, "%ld\n", n_steps);
-    fclose(file);
 }
 
 static int is_below_root(const char *path) {
@@ -109,26 +115,20 @@ static int is_path_below_root(int folder, const char *path) {
 
 /* Counts a call. Returns 0, or the error with which it must fail. */
 static int enter(void) {
-    pthread_mutex_lock(&lock);
-    long step = ++n_steps;
-    int64_t now_ms = now_ns(CLOCK_MONOTONIC) / 1000000;
-    int is_wanted = wanted_step != 0 && step == wanted_step && action != NULL;
-    int fails = action != NULL && action[0] == 'E';
-    if (is_wanted && fails) failing_until_ms = now_ms + FAILING_MS;
-    int is_failing = fails && now_ms < failing_until_ms;
-    pthread_mutex_unlock(&lock);
+    int64_t step = __atomic_add_fetch(&count->n_steps, 1, __ATOMIC_SEQ_CST);
+    is_wanted = step == wanted_step && action != NULL;
+    if (action == NULL) return 0;
     if (is_wanted && strcmp(action, "kill-before") == 0) kill(getpid(), SIGKILL);
     if (is_wanted && strcmp(action, "delay") == 0) usleep(DELAY_MS * 1000);
-    if (!is_failing) return 0;
+    if (action[0] != 'E') return 0;
+    int64_t now_ms = now_ns(CLOCK_MONOTONIC) / 1000000;
+    if (is_wanted) __atomic_store_n(&count->failing_until_ms, now_ms + FAILING_MS, __ATOMIC_SEQ_CST);
+    if (now_ms >= __atomic_load_n(&count->failing_until_ms, __ATOMIC_SEQ_CST)) return 0;
     return strcmp(action, "ENOSPC") == 0 ? ENOSPC : EIO;
 }
 
 static void leave(void) {
-    if (action == NULL || strcmp(action, "kill-after") != 0) return;
-    pthread_mutex_lock(&lock);
-    int is_reached = wanted_step != 0 && n_steps >= wanted_step;
-    pthread_mutex_unlock(&lock);
-    if (is_reached) kill(getpid(), SIGKILL);
+    if (is_wanted && strcmp(action, "kill-after") == 0) kill(getpid(), SIGKILL);
 }
 
 /* One record: header, path, data. */
@@ -280,8 +280,9 @@ static char **environment_of(char *const arguments[], char **given) {
     static char *entries[64];
     int is_attempt = 0, n = 0;
     for (int k = 0; arguments[k] != NULL; k++) is_attempt |= strcmp(arguments[k], "attempt") == 0;
-    if (log_fd < 0 || !is_attempt) return given;
-    for (; n < 3; n++) entries[n] = inherited_entries[n];
+    if (root[0] == 0 || !is_attempt) return given;
+    for (int k = 0; k < N_INHERITED; k++)
+        if (inherited_entries[k][0] != 0) entries[n++] = inherited_entries[k];
     for (; given != NULL && *given != NULL && n < 63; given++) entries[n++] = *given;
     entries[n] = NULL;
     return entries;
