@@ -7,6 +7,7 @@ Object.assign(globalThis, { location: new URL("http://page/"), localStorage: { g
 const { piecesOf } = await import("../../static/js/reel/pieces.js");
 const { changedOf, filesOf, filmFileOf, savedName, sharedFilesOf, studioAddress } = await import("../../static/js/reel/settings.js");
 const { pathOf, readLink } = await import("../../static/js/reel/shared-link.js");
+const { sharedTitle } = await import("../../static/js/reel/shared-title.js");
 const { roundUp, seriesOf, thin } = await import("../../static/js/reel/strips.js");
 const { createTracks, readTracks } = await import("../../static/js/reel/tracks.js");
 
@@ -16,6 +17,15 @@ const FIELDS = new Map([
   field("rules.zones", null, "group", true), field("rules.zones.noise_rad", 0.1), field("goals", [], "other"), field("render", {}, "group"), field("render.formats", ["poster"], "other"), field("render.background", "plate", "other"), field("preset", null, "choice", true),
 ]);
 const PARAMS = { count: 20, frames: 400, rules: { wander: 0.25, zones: null }, goals: [], render: { formats: ["poster"], background: "plate" }, later: 3 };
+
+test("the title of a shared reel tells the film and what its flock does", () => {
+  const saved = (name) => `inline; filename="_"; filename*=UTF-8''${encodeURIComponent(name)}_40x60_s1.plan`;
+  const plan = (predator, stats, nIndividuals = 40) => ({ head: { params: { predator }, stats }, nIndividuals });
+  assert.equal(sharedTitle(plan({}, {}), saved("zebra-finch")), "40 × zebra finch, fleeing");
+  assert.equal(sharedTitle(plan(null, { milling: 0.7 }), saved("two.dots")), "40 × two.dots, circling");
+  assert.equal(sharedTitle(plan(null, { milling: 0, polarization: 0.9 }, 1), saved("魚")), "1 × 魚");
+  assert.equal(sharedTitle(plan(null, {}), ""), "A film of 40 animals, heading in different directions");
+});
 
 test("settings that are the default are left out", () => {
   assert.deepEqual(changedOf(PARAMS, FIELDS), { count: 20 });

@@ -198,7 +198,7 @@ def test_a_page_for_friends_plays_the_film_without_a_token(reel, browser, flock)
     asked = []
     friend.on("request", lambda request: asked.append(request.url) if "/v1/" in request.url else None)
     friend.goto(link)
-    expect(friend.locator("h1")).to_contain_text(f"{flock['count']} animals")
+    expect(heading(friend)).to_contain_text(f"{flock['count']} × goldfish")
     expect(friend.locator(".reel-strip").first).to_be_visible(timeout=LOAD_MS)
     until(friend, "document.querySelector('.stage video').readyState > 1")
     assert asked

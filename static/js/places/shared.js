@@ -9,6 +9,7 @@ import { decodePlan } from "../flock/plan.js";
 import { timeline } from "../parts/timeline.js";
 import { film, wholeScreen } from "../reel/film.js";
 import { readLink } from "../reel/shared-link.js";
+import { sharedTitle } from "../reel/shared-title.js";
 import { strips } from "../reel/strips.js";
 import { factsBox } from "../studio/facts.js";
 
@@ -26,7 +27,7 @@ export async function show(root, { id, query, life }) {
   if (!answer.ok) return refuse(root, "shared.gone");
   const plan = decodePlan(await answer.arrayBuffer());
   const size = plan.head.params?.render?.size_px ?? plan.sizePx;
-  const name = say("shared.title", { n: plan.nIndividuals });
+  const name = sharedTitle(plan, answer.headers.get("content-disposition") ?? "");
   setTitle(name);
 
   const asked = query.get("t");

@@ -8,13 +8,16 @@ const CLONES = 0.05;
 /** Steps of animals from which the order is computed, so that the page does not halt. */
 const MOST_CELLS = 20_000;
 
+/** Returns what most of a flock does, by its measures of order. @param {Pick<Api.FlockStats, "polarization" | "milling">} stats */
+export const orderKindOf = ({ milling, polarization }) => (milling > 0.6 ? "mill" : polarization > 0.8 ? "school" : polarization > 0.5 ? "loose" : "swarm");
+
 /** Returns the sentences about a plan. @param {import("../flock/plan.js").Plan} plan */
 function sentencesOf({ head: { stats }, nIndividuals: n, isPart, nFrames, fps }) {
   const facts = [];
   const advice = [];
   const order = stats.polarization;
   if (order !== undefined && n > 1) {
-    const kind = stats.milling > 0.6 ? "mill" : order > 0.8 ? "school" : order > 0.5 ? "loose" : "swarm";
+    const kind = orderKindOf(stats);
     facts.push(say(`facts.order.${kind}`, { order: percent(kind === "mill" ? stats.milling : order) }));
   }
   const apart = stats.spacing_bl ?? stats.nearest_neighbor_bl;
