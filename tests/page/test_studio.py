@@ -287,6 +287,23 @@ def test_backgrounds_are_in_sight_without_opening_a_group(studio):
     assert page.locator(".studio-panel details[open]").count() == 0
 
 
+def test_files_that_the_background_implies_are_no_change_of_the_person(studio):
+    page, _ = studio
+    background = lambda one: page.get_by_role("radio", name=say(page, f"set.background.{one}"), exact=True)  # noqa: E731
+    mark = page.locator("#group-files > summary .mark")
+    background("transparent").check()
+    assert "webm" in settings(page)["render.formats"]
+    expect(mark).to_be_empty()
+    background("plate").check()
+    assert "render.formats" not in settings(page)
+    background("transparent").check()
+    page.locator("#group-files > summary").click()
+    page.get_by_role("checkbox", name=say(page, "set.format.gif")).check()
+    expect(mark).to_have_text(say(page, "group.changed", n=1))
+    background("plate").check()
+    assert "gif" in settings(page)["render.formats"]
+
+
 def test_flight_is_chosen_in_one_place(studio):
     page, _ = studio
     expect(page.locator("#flee").get_by_role("radio")).to_have_count(3)

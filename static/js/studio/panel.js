@@ -37,7 +37,7 @@ export function panel(studio) {
   const node = element("div.settings", {}, behaviors.node, ...plain(names.main), things, ...own("render.background", background, valueOf), ...plain(names.more),
     group("move", ...plain(names.move), group("fine", ...plain(names.fine)), group("zones", element("label.check", {}, useZones, element("span", {}, say("zones.use"))), zones), group("matching", ...plain(names.matching))),
     group("look", ...own("render.size_px", size, film.size), ...plain(names.look), element("p.soft", {}, say("set.look.note"))),
-    group("files", ...own("render.formats", files, studio.formats), ...plain(names.files)));
+    group("files", ...own("render.formats", files, studio), ...plain(names.files)));
 
   return {
     node, things,
