@@ -120,7 +120,7 @@ export default {
 
   // The desk.
   "unit.cm": "{n} cm", "unit.px": "{n} pixels", "unit.bl_per_s": "{n} body lengths/s", "unit.hz": "{n} beats per second",
-  "desk.title": "{film}, measured", "desk.film": "The film with the measurement drawn over it", "desk.fish": "Virtual fish", "desk.the_film": "Film",
+  "desk.title": "{film}, measured", "desk.film": "The film with the measurement drawn over it", "desk.fish": "Virtual fish", "desk.fish.help": "A 3-D model of a goldfish that moves as the filmed animal does, whatever the animal is", "desk.the_film": "Film",
   "desk.look": "Picture", "desk.look.film": "Film", "desk.look.background": "Background", "desk.look.sprite": "Cut-out", "desk.look.difference": "Difference", "desk.marks": "Show the measurement",
   "desk.look.film.label": "The film. Box, middle, head, midline, heading and the path of the last two seconds are drawn over it.",
   "desk.look.background.label": "The scene without the animal, and the path of the animal. A click goes to that moment.",

@@ -119,7 +119,7 @@ export default {
 
   // The desk.
   "unit.cm": "{n} cm", "unit.px": "{n}画素", "unit.bl_per_s": "{n}体長/秒", "unit.hz": "毎秒{n}回",
-  "desk.title": "計測結果：{film}", "desk.film": "計測結果を重ねた動画", "desk.fish": "バーチャルフィッシュ", "desk.the_film": "動画",
+  "desk.title": "計測結果：{film}", "desk.film": "計測結果を重ねた動画", "desk.fish": "バーチャルフィッシュ", "desk.fish.help": "撮影した動物と同じ動きをする3Dモデルの金魚（どの動物を撮影しても金魚になります）", "desk.the_film": "動画",
   "desk.look": "表示する画像", "desk.look.film": "動画", "desk.look.background": "背景", "desk.look.sprite": "切り抜き", "desk.look.difference": "差分", "desk.marks": "計測結果を重ねる",
   "desk.look.film.label": "動画です。外接長方形、重心、頭、正中線、方向、直前2秒間の軌跡を重ねています。",
   "desk.look.background.label": "動物のいない背景と、動物の軌跡です。クリックするとその時点へ移ります。",

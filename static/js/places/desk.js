@@ -49,7 +49,7 @@ export async function show(root, { id, query, life }) {
 
   root.append(
     element("header.place-head", {}, element("h1", { tabIndex: -1 }, filmName(library)),
-      element("p.actions", {}, element("a.button", { href: `/libraries/${id}/studio` }, say("film.studio")), element("a.button.quiet", { href: `/libraries/${id}/fish` }, say("desk.fish")), element("a.button.quiet", { href: `/films/${library.footage_id}` }, say("desk.the_film")), element("button.quiet#measure-again", { type: "button", onclick: () => remeasure("", {}) }, say("remeasure.title")))),
+      element("p.actions", {}, element("a.button", { href: `/libraries/${id}/studio` }, say("film.studio")), element("a.button.quiet", { href: `/films/${library.footage_id}` }, say("desk.the_film")), element("button.quiet#measure-again", { type: "button", onclick: () => remeasure("", {}) }, say("remeasure.title")), element("a.button.quiet", { href: `/libraries/${id}/fish`, title: say("desk.fish.help") }, say("desk.fish")))),
     failure,
     element("div.desk-pair", {},
       element("section.desk-film", { "aria-label": say("desk.film") }, stage.node, stage.controls, transport.node, transport.reading),

@@ -110,9 +110,9 @@ async function showMeasured(libraryId, parts, note = "") {
     const links = [studio, element("a.button.quiet", { href: `/libraries/${libraryId}` }, say("film.desk"))];
     await showFlock(stage, { library, planning, life, links });
     const again = element("button.quiet", { type: "button", onclick: () => measure(film.id, {}, { show: true }) }, say("job.again"));
-    const fish = element("a.button.quiet", { href: `/libraries/${libraryId}/fish` }, say("desk.fish"));
+    const fish = element("a.button.quiet", { href: `/libraries/${libraryId}/fish`, title: say("desk.fish.help") }, say("desk.fish"));
     const hadFocus = status.contains(document.activeElement);
-    status.replaceChildren(element("p", {}, note || say("film.flock"), " ", say("film.next")), element("p.actions", {}, fish, again));
+    status.replaceChildren(element("p", {}, note || say("film.flock"), " ", say("film.next")), element("p.actions", {}, again, fish));
     if (hadFocus) studio.focus({ preventScroll: true });
   } catch (problem) {
     if (life.aborted) return;
