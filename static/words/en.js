@@ -24,7 +24,7 @@ export default {
   "state.queued": "Waiting", "state.running": "Working", "state.done": "Done", "state.failed": "Failed", "state.cancelled": "Cancelled", "state.cancelling": "Stopping",
   "stage.starting": "Starting", "stage.filming": "Filming a virtual goldfish", "stage.background": "Finding the still scene", "stage.tracking": "Following the animal",
   "stage.distances": "Comparing moments", "stage.writing": "Storing the result", "stage.overlay": "Drawing the measurement over the film",
-  "stage.loading": "Opening the library", "stage.simulating": "Simulating the flock", "stage.planning": "Choosing frames for every individual", "stage.rendering": "Drawing the film",
+  "stage.loading": "Opening the library", "stage.simulating": "Simulating the flock", "stage.planning": "Choosing frames for every individual", "stage.rendering": "Drawing the film", "stage.files": "Writing files",
 
   "drop.here": "Let go to measure the film", "drop.folder": "This is a folder", "drop.folder.detail": "Drop the films inside it.",
   "film.unnamed": "a film", "film.sample": "virtual goldfish", "film.deleted": "a deleted film", "film.measured": "measured", "film.not_measured": "not measured", "film.measure": "Measure the film",

@@ -23,7 +23,7 @@ export default {
   "state.queued": "待機中", "state.running": "実行中", "state.done": "完了", "state.failed": "失敗", "state.cancelled": "キャンセル済み", "state.cancelling": "キャンセル中",
   "stage.starting": "開始中", "stage.filming": "仮想の金魚を撮影中", "stage.background": "背景を推定中", "stage.tracking": "動物を追跡中",
   "stage.distances": "距離行列を計算中", "stage.writing": "結果を保存中", "stage.overlay": "計測結果を動画に描画中",
-  "stage.loading": "計測結果を読み込み中", "stage.simulating": "群行動を計算中", "stage.planning": "各個体のフレームを選択中", "stage.rendering": "動画を描画中",
+  "stage.loading": "計測結果を読み込み中", "stage.simulating": "群行動を計算中", "stage.planning": "各個体のフレームを選択中", "stage.rendering": "動画を描画中", "stage.files": "ファイルを書き込み中",
 
   "drop.here": "ドロップすると計測を始めます", "drop.folder": "フォルダーはドロップできません", "drop.folder.detail": "フォルダーの中の動画をドロップしてください。",
   "film.unnamed": "名前のない動画", "film.sample": "仮想の金魚", "film.deleted": "削除された動画", "film.measured": "計測済み", "film.not_measured": "未計測", "film.measure": "動画を計測",

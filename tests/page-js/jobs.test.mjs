@@ -13,6 +13,9 @@ globalThis.fetch = (path) => new Promise((resolve) => asked.push({ path, answer:
 mock.timers.enable({ apis: ["setTimeout", "setInterval"] });
 const { aheadOf, ended, expect, isUnderWay, jobs, startJobs } = await import("../../static/js/app/jobs.js");
 
+const { timeLeft } = await import("../../static/js/parts/time-left.js");
+const { stageOf } = await import("../../static/js/app/words.js");
+
 const job = (n, state, more = {}) => ({ id: String(n).padStart(4, "0"), state, attempt: 1, links: { result: `/v1/flocks/${n}` }, ...more });
 const settle = async () => { for (let k = 0; k < 20; k++) await Promise.resolve(); };
 const tell = (name, data) => streams[0].dispatchEvent(Object.assign(new Event(name), { data: JSON.stringify(data) }));
@@ -29,6 +32,28 @@ while (!streams.length) await new Promise((resolve) => setImmediate(resolve));
 while (asked.length) await answer({ items: [job(1, "running")] });
 streams[0].dispatchEvent(new Event("open"));
 await settle();
+
+test("the time left never rises within a stage, and is told only while the speed is known", () => {
+  const left = timeLeft();
+  const at = (s, progress, stage = "rendering") => left({ stage, progress }, s * 1000);
+  assert.deepEqual([at(0, 0.1, "planning"), at(4, 0.3, "planning")], [null, null]);
+  assert.equal(Math.round(at(10, 0.3, "planning")), 35);
+  // The next stage is slower than the first ones let expect.
+  assert.deepEqual([at(11, 0.4), at(15, 0.41)], [null, null]);
+  const told = Array.from({ length: 50 }, (_, k) => at(17 + k, 0.46 + 0.01 * k + 0.004 * Math.sin(k)));
+  assert.ok(told.every((value, k) => !k || value <= told[k - 1]), String(told));
+  assert.ok(told[0] > 40 && told.at(-1) < 8, String(told));
+  // The work halts: no number is better than one that grows.
+  assert.equal(at(90, 0.955), null);
+  assert.equal(at(91, 1), null);
+});
+
+test("at the end of a job the page tells what happens, and no whole percentage", () => {
+  const running = { state: "running", stage: "rendering" };
+  assert.match(stageOf({ ...running, progress: 0.99 }), /^Drawing the film . 99%$/);
+  assert.equal(stageOf({ ...running, progress: 0.996 }), "Writing files");
+  assert.equal(stageOf({ ...running, progress: 1, cancel_requested: true }), "Stopping");
+});
 
 test("an answer that is older than an event changes nothing", async () => {
   tell("job", job(1, "done"));

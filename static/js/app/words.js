@@ -94,9 +94,13 @@ export function direction(heading_rad) {
 /** Returns a heading as text, such as "34° (down right)". @param {number} heading_rad */
 export const heading = (heading_rad) => `${whole.format(degrees(heading_rad)).replace("-", "−")}° (${direction(heading_rad)})`;
 
-/** Returns the current stage of a job as text. @param {Api.Job} job */
+/** Progress of a job from which all is computed, and only its files are being written. */
+const COMPUTED = 0.995;
+
+/** Returns the state of a job as text, while it runs with its stage and progress. @param {Api.Job} job */
 export function stageOf(job) {
   if (job.state !== "running") return say(`state.${job.state}`);
   if (job.cancel_requested) return say("state.cancelling");
-  return sayOr(`stage.${job.stage ?? "starting"}`, say("stage.starting"));
+  if (job.progress >= COMPUTED) return say("stage.files");
+  return `${sayOr(`stage.${job.stage ?? "starting"}`, say("stage.starting"))} · ${percent(job.progress)}`;
 }

@@ -18,7 +18,7 @@ export function startTray() {
     const first = running.find((job) => job.state === "running") ?? running[0];
     const part = sending.length ? sending[0].sent / (sending[0].total || 1) : first?.progress ?? 0;
     what.textContent = sending.length ? say("tray.sending", { n: sending.length }) : first ? say("tray.busy", { n: running.length }) : refused ? say("tray.refused", { n: refused }) : paused ? say("tray.paused", { n: paused }) : say("tray.idle");
-    share.textContent = sending.length || first ? percent(part) : "";
+    share.textContent = sending.length || first ? percent(Math.min(0.99, part)) : "";
     button.style.setProperty("--share", `${Math.round(100 * part)}%`);
     button.classList.toggle("busy", sending.length > 0 || running.length > 0);
     button.classList.toggle("refused", refused > 0);

@@ -3,16 +3,15 @@
 import { byId, element } from "../app/element.js";
 import { addressOf, aheadOf, cancel, isUnderWay, jobs, resultOf, retry, subjectIdOf, uploads } from "../app/jobs.js";
 import { subjectOf } from "../app/names.js";
-import { ago, percent, say, size, stageOf } from "../app/words.js";
+import { ago, say, size, stageOf } from "../app/words.js";
 import { fileButton, measure } from "./drop.js";
 import { filmButtons } from "./film-buttons.js";
 import { mendsOf } from "./mend.js";
 import { problemBox } from "./problem.js";
+import { timeLeft } from "./time-left.js";
 
 /** Number of ended jobs in the tray; the place of all jobs shows more. */
 const ENDED = 4;
-/** Share of a job and time since its start after which its time left can be told, and the least share that is not all start-up. */
-const [TOLD_SHARE, TOLD_S, LEAST_SHARE] = [0.2, 5, 0.05];
 
 /** Fills the tray and keeps it up to date. */
 export function fillTray() {
@@ -58,6 +57,7 @@ export function jobCard(job) {
   const problem = element("div");
   const thumb = element("img.job-thumb", { alt: "", width: 64, height: 48, hidden: true });
   const card = element("article.job", {}, thumb, element("div.job-body", {}, element("div.job-line", {}, name, stage), bar, more, problem, actions));
+  const left = timeLeft();
   let [drawn, isNamed] = ["", true];
   const tellSubject = async (/** @type {Api.Job} */ seen) => {
     // Without an answer of the service, it is asked again at the next change.
@@ -71,9 +71,10 @@ export function jobCard(job) {
   const update = (/** @type {Api.Job} */ seen) => {
     bar.value = seen.progress ?? 0;
     bar.hidden = !isUnderWay(seen);
-    stage.textContent = seen.state === "running" ? `${stageOf(seen)} · ${percent(seen.progress ?? 0)}` : stageOf(seen);
-    more.textContent = isUnderWay(seen) ? [aheadText(seen), leftText(seen), seen.attempt > 1 ? say("job.restarted", { n: seen.attempt }) : ""].filter(Boolean).join(" ") : ago(seen.finished_at ?? seen.created_at);
-    more.hidden = !more.textContent;
+    stage.textContent = stageOf(seen);
+    more.textContent = isUnderWay(seen) ? [aheadText(seen), leftText(left(seen, Date.now())), seen.attempt > 1 ? say("job.restarted", { n: seen.attempt }) : ""].filter(Boolean).join(" ") : ago(seen.finished_at ?? seen.created_at);
+    // An empty line keeps its place, so that what is told later moves no button.
+    more.hidden = !isUnderWay(seen) && !more.textContent;
     const state = `${seen.state} ${seen.cancel_requested}`;
     if (state === drawn) return isNamed ? undefined : void tellSubject(seen);
     drawn = state;
@@ -111,13 +112,9 @@ const once = (request) => (/** @type {Event} */ { target }) => {
   request().catch(() => { button.disabled = false; });
 };
 
-/** Returns the time left as text, estimated from the progress since the job began. @param {Api.Job} job */
-function leftText(job) {
-  const elapsed_s = (Date.now() - Date.parse(job.started_at ?? "")) / 1000;
-  const isKnown = job.progress >= LEAST_SHARE && (job.progress >= TOLD_SHARE || elapsed_s >= TOLD_S);
-  // The start of a job is that of its first attempt.
-  if (job.state !== "running" || job.attempt > 1 || !isKnown) return "";
-  const left_s = Math.max(1, elapsed_s / job.progress - elapsed_s);
+/** Returns the time left as text; empty if it is unknown. @param {number | null} left_s */
+function leftText(left_s) {
+  if (left_s === null) return "";
   return say("job.left", { time: left_s < 90 ? say("unit.seconds", { n: Math.round(left_s) }) : say("unit.minutes", { n: Math.round(left_s / 60) }) });
 }
 

@@ -5,7 +5,7 @@ import { element } from "../app/element.js";
 import { isUnderWay, jobs, subjectIdOf } from "../app/jobs.js";
 import { filmName } from "../app/names.js";
 import { setTitle } from "../app/router.js";
-import { percent, say, stageOf } from "../app/words.js";
+import { say, stageOf } from "../app/words.js";
 import { filmCard } from "../parts/cards.js";
 import { fileButton } from "../parts/drop.js";
 import { pinButton, spaceSentence } from "../parts/pin.js";
@@ -65,7 +65,7 @@ export async function show(root, { life }) {
       const mine = jobs.value.filter((job) => job.kind === "analysis" && job.subject?.id === film.id);
       const job = mine.find(isUnderWay) ?? mine[0];
       node.dataset.state = job && isUnderWay(job) ? "running" : library ? "measured" : job?.state === "failed" ? "refused" : "bare";
-      state.textContent = job && isUnderWay(job) ? `${stageOf(job)} · ${percent(job.progress ?? 0)}` : library ? say("film.measured") : job?.state === "failed" ? job.error?.title ?? say("state.failed") : say("film.not_measured");
+      state.textContent = job && isUnderWay(job) ? stageOf(job) : library ? say("film.measured") : job?.state === "failed" ? job.error?.title ?? say("state.failed") : say("film.not_measured");
     }
   };
   const fill = async () => {

@@ -1,0 +1,23 @@
+// The time left of a job, from the speed of its present stage. It never rises within a stage, and nothing is told while it
+// is unknown.
+// @ts-check
+
+/** Time of a stage after which its speed is known, s. */
+const KNOWN_S = 5;
+/** An estimate this many times what was told shows that the speed is unknown. */
+const DOUBTFUL = 1.5;
+
+/** Returns a function that estimates the time left, s, or null. Times are in ms. */
+export function timeLeft() {
+  let [stage, from, from_ms, end_ms] = ["", 0, 0, Infinity];
+  return (/** @type {Pick<Api.Job, "stage" | "progress">} */ job, /** @type {number} */ now_ms) => {
+    if (job.stage !== stage) [stage, from, from_ms, end_ms] = [job.stage ?? "", job.progress, now_ms, Infinity];
+    const spent_ms = now_ms - from_ms;
+    if (spent_ms < KNOWN_S * 1000 || job.progress <= from || job.progress >= 1) return null;
+    const left_ms = (spent_ms * (1 - job.progress)) / (job.progress - from);
+    const told_ms = end_ms - now_ms;
+    if (left_ms > DOUBTFUL * told_ms) return null;
+    end_ms = Math.min(end_ms, now_ms + left_ms);
+    return Math.max(1, (end_ms - now_ms) / 1000);
+  };
+}
