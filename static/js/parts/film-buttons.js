@@ -26,24 +26,29 @@ export async function linkTo(flock, expires_s, life) {
 
 /**
  * Returns the buttons, and the place in which they tell what they did.
- * @param {string} flockId @returns {HTMLElement[]}
+ * @param {string} flockId @param {{isTold?: boolean}} [options] @returns {HTMLElement[]}
  */
-export function filmButtons(flockId) {
+export function filmButtons(flockId, options) {
   const save = element("a.button.quiet", { href: `/v1/flocks/${flockId}/video.mp4`, download: "", onclick: async (/** @type {MouseEvent} */ event) => {
     event.preventDefault();
     // A transparent flock is saved as the film that is transparent.
     const name = await thing("flocks", flockId).then(filmFileOf, () => "video.mp4");
     element("a", { href: `/v1/flocks/${flockId}/${name}`, download: "" }).click();
   } }, say("job.download"));
-  return [save, ...linkButton(flockId)];
+  return [save, ...linkButton(flockId, options)];
 }
 
-/** Returns the button that copies a link, and the place in which it tells more. @param {string} flockId @returns {HTMLElement[]} */
-export function linkButton(flockId) {
+/**
+ * Returns the button that copies a link, and the place in which it tells more.
+ * @param {string} flockId @param {{isTold?: boolean}} [options] `isTold` tells from the start how the link works, so that a click moves nothing
+ * @returns {HTMLElement[]}
+ */
+export function linkButton(flockId, { isTold = false } = {}) {
   const told = element("span.copied", { role: "status" });
-  const tell = (/** @type {string} */ words) => told.replaceChildren([words, isHere() && say("reel.share.here", { host: location.host })].filter(Boolean).join(" "));
+  const tell = () => told.replaceChildren([say("link.lasts"), isHere() && say("reel.share.here", { host: location.host })].filter(Boolean).join(" "));
+  if (isTold) tell();
   const button = copyButton(say("link.copy"), async () => (await linkTo(await thing("flocks", flockId), LASTING_S)).url, {
-    onCopied: () => tell(say("link.copied")),
+    onCopied: tell,
     onRefused(url) {
       const field = element("input", { readOnly: true, value: url, "aria-label": say("link.copy") });
       told.replaceChildren(say("link.refused"), field);

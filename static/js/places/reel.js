@@ -89,11 +89,12 @@ export async function show(root, { id, query, life }) {
   }
   const studio = element("a.button", { href: `/libraries/${flock.library_id}/studio` }, say("reel.studio"));
   const drop = element("button.quiet", { type: "button", onclick: discard }, say("reel.delete"));
+  const [copy, told] = linkButton(flock.id, { isTold: true });
   const facts = factsBox();
   const ways = share(library ?? { id: flock.library_id });
   const strip = element("div");
   root.append(
-    element("header.place-head", {}, element("div", {}, element("h1", { tabIndex: -1 }, name), element("p.soft", {}, factsOf(flock, size))), element("p.actions", {}, studio, ...linkButton(flock.id), drop)),
+    element("header.place-head", {}, element("div", {}, element("h1", { tabIndex: -1 }, name), element("p.soft", {}, factsOf(flock, size))), element("p.actions", {}, studio, copy, drop, told)),
     element("section.reel-view", { "aria-label": say("reel.watch") }, views.stage,
       element("div.stage-controls", {}, choices, truth?.choices, wholeScreen(views.stage, life)), time.node, strip, askedPart.node, trouble, truth?.table),
     facts.node,

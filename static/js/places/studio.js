@@ -82,7 +82,7 @@ export async function show(root, visit) {
     cards,
     element("div.studio", {},
       place,
-      element("section.studio-panel", { "aria-label": say("studio.panel") }, side.node, maker({ libraryId, settings: () => settings.now.value, life, beside: ways.button }).node, ways.node),
+      element("section.studio-panel", { "aria-label": say("studio.panel") }, side.node, maker({ libraryId, settings: () => settings.now.value, life }).node, ways.node),
       below));
 
   const planner = createPlanner({

@@ -9,8 +9,8 @@ import { problemBox } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
 import { bodyOf } from "./settings.js";
 
-/** @param {{libraryId: string, settings: () => import("./settings.js").Settings, life: AbortSignal, beside: HTMLElement}} options `beside`: the button beside it */
-export function maker({ libraryId, settings, life, beside }) {
+/** @param {{libraryId: string, settings: () => import("./settings.js").Settings, life: AbortSignal}} options */
+export function maker({ libraryId, settings, life }) {
   const button = element("button.make-film", { type: "button", onclick: make }, say("make.film"));
   const state = element("div.make-state", { "aria-live": "polite" });
 
@@ -31,18 +31,18 @@ export function maker({ libraryId, settings, life, beside }) {
   async function follow(jobId, flockId) {
     /** @type {ReturnType<typeof jobCard> | null} */
     let card = null;
-    const place = element("div");
+    const place = element("div.make-place");
     state.replaceChildren(place);
     try {
       await ended(jobId, life, (job) => {
-        if (!card) place.append(card = jobCard(job));
+        if (!card) place.append(card = jobCard(job), element("p.soft", {}, say("make.wait")));
         card.update(job);
       });
-      place.replaceChildren(element("p.done", {}, say("make.done"), " ", element("a.button", { href: `/flocks/${flockId}` }, say("make.open")), ...filmButtons(flockId)));
+      place.replaceChildren(element("p.done", {}, say("make.done"), " ", element("a.button", { href: `/flocks/${flockId}` }, say("make.open")), ...filmButtons(flockId, { isTold: true })));
     } catch (problem) {
       if (!life.aborted && /** @type {any} */ (problem).name === "AbortError") place.remove();
     }
   }
 
-  return { node: element("div.make-box", {}, element("p.make-line", {}, button, beside), state) };
+  return { node: element("div.make-box", {}, button, state) };
 }

@@ -28,8 +28,8 @@ export function share(library) {
     const ways = /** @type {Record<string, string>} */ (waysOf(library, settings, { link, origin: location.origin, needsToken: isSignedIn(), defaults }));
     for (const { name, text } of rows) text.textContent = ways[name];
   }
-  return { node, update, button: copyTextOf(rows[0].text, say("share.copy_link"), () => { node.open = true; }) };
+  return { node, update };
 }
 
-/** Returns a button that copies the text of an element; where the browser refuses, the text is selected. @param {HTMLElement} node @param {string} label @param {() => void} [reveal] */
-export const copyTextOf = (node, label, reveal = () => {}) => copyButton(label, () => node.textContent ?? "", { onRefused: () => { reveal(); getSelection()?.selectAllChildren(node); } });
+/** Returns a button that copies the text of an element; where the browser refuses, the text is selected. @param {HTMLElement} node @param {string} label */
+export const copyTextOf = (node, label) => copyButton(label, () => node.textContent ?? "", { onRefused: () => getSelection()?.selectAllChildren(node) });
