@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
+use reqwest::Url;
+
+use crate::traces;
 
 /// Settings of the service. Flags override environment variables, which override defaults.
 #[derive(Args, Clone, Debug)]
@@ -192,6 +195,10 @@ pub struct Monitoring {
     /// Second address, which serves only /metrics and needs no token.
     #[arg(long, env = "FLOCKREEL_METRICS_BIND", value_name = "ADDRESS")]
     pub metrics_bind: Option<SocketAddr>,
+    /// Address of a collector of OpenTelemetry, which receives the spans of requests and jobs by OTLP over HTTP, such
+    /// as `http://collector:4318`.
+    #[arg(long, env = "FLOCKREEL_OTLP_ENDPOINT", value_name = "URL", value_parser = traces::check_endpoint)]
+    pub otlp_endpoint: Option<Url>,
 }
 
 /// Location of the database.

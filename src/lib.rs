@@ -9,6 +9,7 @@ pub mod config; // every setting
 pub mod logging; // log lines on stderr
 pub mod media; // ffmpeg in a sandbox
 pub mod store; // database rows and stored files
+pub mod traces; // spans for a collector of OpenTelemetry
 
 // Ring 4: interfaces.
 pub mod api; // HTTP

@@ -16,9 +16,13 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use tracing::Level;
 use tracing_appender::non_blocking::{NonBlocking, NonBlockingBuilder, WorkerGuard};
-use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::format::Writer;
 use tracing_subscriber::fmt::time::{FormatTime, SystemTime};
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
+use tracing_subscriber::{EnvFilter, Layer};
+
+use crate::traces::Exporter;
 
 /// Maximum number of lines that wait for stderr: a few megabytes, or seconds of a busy service.
 const MAX_QUEUED_LINES: usize = 8192;
@@ -78,8 +82,9 @@ pub fn check_filter(filter: &str) -> Result<String, String> {
     parsed.map_or_else(|error| Err(error.to_string()), |_| Ok(filter.to_owned()))
 }
 
-/// Starts the log of the process. Call it once. `filter` has passed [`check_filter`]; any other logs errors only.
-pub fn start(filter: &str, format: LogFormat) -> Log {
+/// Starts the log of the process and its export of traces. Call it once. `filter` has passed [`check_filter`]; any
+/// other logs errors only.
+pub fn start(filter: &str, format: LogFormat, exporter: Option<&Exporter>) -> Log {
     let (queue, writer) = NonBlockingBuilder::default()
         .lossy(true)
         .buffered_lines_limit(MAX_QUEUED_LINES)
@@ -88,20 +93,24 @@ pub fn start(filter: &str, format: LogFormat) -> Log {
     let queue = QUEUE.get_or_init(|| queue).clone();
     SETTINGS.get_or_init(|| (filter.to_owned(), format));
     set_format(format);
-    let lines = tracing_subscriber::fmt()
-        .with_env_filter(EnvFilter::try_new(filter).unwrap_or_default())
+    let lines = tracing_subscriber::fmt::layer()
         .with_writer(queue)
         .with_ansi(io::stderr().is_terminal())
         .with_target(false)
         .log_internal_errors(false);
-    match format {
-        LogFormat::Text => lines.init(),
+    let lines = match format {
+        LogFormat::Text => lines.boxed(),
         LogFormat::Json => lines
             .json()
             .flatten_event(true)
             .with_span_list(false)
-            .init(),
-    }
+            .boxed(),
+    };
+    let filter = EnvFilter::try_new(filter).unwrap_or_default();
+    tracing_subscriber::registry()
+        .with(lines.with_filter(filter))
+        .with(exporter.map(Exporter::layer))
+        .init();
     Log { _writer: writer }
 }
 

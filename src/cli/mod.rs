@@ -41,6 +41,7 @@ use crate::config;
 use crate::logging::{self, LogFormat, say, say_error};
 use crate::media::{self, Tool};
 use crate::store::Spill;
+use crate::traces::Exporter;
 use flockreel_core::formats::library_dir::{self, StoredLibrary};
 use flockreel_core::scratch::Scratch;
 
@@ -130,7 +131,19 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
     let serves = matches!(cli.command, Command::Serve(_) | Command::Worker(_));
     // Services log all their events, other commands only warnings.
     let default = if serves { "info" } else { "warn" };
-    let _log = logging::start(cli.log.as_deref().unwrap_or(default), cli.log_format);
+    let endpoint =
+        monitoring(&cli.command).and_then(|monitoring| monitoring.otlp_endpoint.as_ref());
+    let exporter = match endpoint.map(Exporter::start).transpose() {
+        Ok(exporter) => exporter,
+        Err(error) => {
+            say_error(&format!("flockreel: traces cannot be exported: {error}"));
+            return ExitCode::FAILURE;
+        }
+    };
+    let filter = cli.log.as_deref().unwrap_or(default);
+    let _log = logging::start(filter, cli.log_format, exporter.as_ref());
+    // Ends before the log, to which it reports.
+    let _exporter = exporter;
     if serves || logging::is_json() || matches!(cli.command, Command::Attempt(_)) {
         logging::log_panics();
     }
@@ -144,6 +157,15 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
             }
             ExitCode::from(error.exit_code())
         }
+    }
+}
+
+/// Returns how a service is monitored; `None` for other commands.
+fn monitoring(command: &Command) -> Option<&config::Monitoring> {
+    match command {
+        Command::Serve(args) => Some(args.monitoring()),
+        Command::Worker(args) => Some(args.monitoring()),
+        _ => None,
     }
 }
 

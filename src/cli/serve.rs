@@ -9,7 +9,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use super::{Error, Summary};
 use crate::api::server::Stop;
 use crate::api::{self, AppState};
-use crate::config::{Auth, Config};
+use crate::config::{Auth, Config, Monitoring};
 use crate::jobs::clock::now_ms;
 use crate::jobs::sample;
 use crate::jobs::supervisor::Supervisor;
@@ -25,6 +25,13 @@ const MAX_WAITING_CONNECTIONS: u32 = 4096;
 pub struct Args {
     #[command(flatten)]
     config: Config,
+}
+
+impl Args {
+    /// Returns how the process is monitored.
+    pub fn monitoring(&self) -> &Monitoring {
+        &self.config.monitoring
+    }
 }
 
 /// Serves until SIGTERM or SIGINT.

@@ -29,6 +29,13 @@ pub struct Args {
     monitoring: Monitoring,
 }
 
+impl Args {
+    /// Returns how the process is monitored.
+    pub fn monitoring(&self) -> &Monitoring {
+        &self.monitoring
+    }
+}
+
 /// Runs jobs until SIGTERM or SIGINT.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let runtime = super::runtime()?;

@@ -21,6 +21,7 @@ use crate::store::jobs::heartbeat::Beat;
 use crate::store::jobs::requeue::End;
 use crate::store::jobs::retry::may_pass;
 use crate::store::jobs::{Change, Lease};
+use crate::traces;
 use flockreel_core::code::Code;
 use flockreel_core::ids::JobId;
 
@@ -82,7 +83,14 @@ impl Worker {
             attempt = lease.attempt,
             trace_id = lease.trace_id()
         );
-        self.attempt(lease).instrument(span).await
+        if let Some(header) = &lease.traceparent {
+            traces::set_parent(&span, header);
+        }
+        let step = self.attempt(lease).instrument(span.clone()).await;
+        if let Ok(Step::Failed(_, code)) = &step {
+            traces::set_failure(&span, code.name());
+        }
+        step
     }
 
     async fn attempt(&self, lease: Lease) -> Result<Step, store::Error> {

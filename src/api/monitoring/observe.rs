@@ -16,9 +16,11 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::Registry;
 use tracing::Instrument;
+use tracing::field::Empty;
 use uuid::Uuid;
 
 use crate::store::jobs::trace::{self, TraceParent};
+use crate::traces;
 
 const TRACE_PARENT: HeaderName = HeaderName::from_static("traceparent");
 const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
@@ -124,9 +126,15 @@ pub(in crate::api) async fn observe(
     let matched = request.extensions().get::<MatchedPath>().cloned();
     let route = matched.as_ref().map_or("unmatched", MatchedPath::as_str);
     let path = request.uri().path();
-    let trace = trace_of(request.headers());
-    let trace_id = trace.as_ref().map(TraceParent::trace_id);
-    let span = tracing::info_span!("request", request_id = id, trace_id, %method, path);
+    let given = trace_of(request.headers());
+    let span = tracing::info_span!("request", request_id = id, trace_id = Empty, %method, path);
+    if let Some(given) = &given {
+        traces::set_parent(&span, given.as_str());
+    }
+    // Jobs become children of the exported span, else of the span that the client named.
+    let exported = traces::header_of(&span).and_then(|header| TraceParent::parse(&header));
+    let trace = exported.or(given);
+    span.record("trace_id", trace.as_ref().map(TraceParent::trace_id));
     requests.under_way.inc();
     let under_way = UnderWay(requests.under_way.clone());
     let answered = trace::within(trace, next.run(request));
@@ -134,7 +142,9 @@ pub(in crate::api) async fn observe(
     drop(under_way);
     let took = start.elapsed();
     requests.count(route, &method, &answer, took);
-    span.in_scope(|| log(route, answer.status().as_u16(), took));
+    let status = answer.status().as_u16();
+    span.in_scope(|| log(route, status, took));
+    traces::set_answer(&span, method.as_str(), route, status);
     if let Ok(id) = HeaderValue::from_str(&id) {
         answer.headers_mut().insert(REQUEST_ID, id);
     }

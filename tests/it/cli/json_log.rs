@@ -174,7 +174,7 @@ fn panic_is_an_object() {
 #[test]
 #[ignore = "the process of the test `panic_is_an_object`"]
 fn panicking_process() {
-    let _log = logging::start("warn", LogFormat::Json);
+    let _log = logging::start("warn", LogFormat::Json, None);
     logging::log_panics();
     let ended = std::thread::spawn(|| panic!("on purpose")).join();
     assert!(ended.is_err());

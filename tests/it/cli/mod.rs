@@ -5,6 +5,7 @@ mod doctor;
 mod json_log;
 mod start;
 mod stderr;
+mod traces;
 mod upkeep;
 
 use std::process::{Command, Output};
