@@ -9,8 +9,6 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use reqwest::Url;
 
-use crate::traces;
-
 /// Settings of the service. Flags override environment variables, which override defaults.
 #[derive(Args, Clone, Debug)]
 pub struct Config {
@@ -197,8 +195,17 @@ pub struct Monitoring {
     pub metrics_bind: Option<SocketAddr>,
     /// Address of a collector of OpenTelemetry, which receives the spans of requests and jobs by OTLP over HTTP, such
     /// as `http://collector:4318`.
-    #[arg(long, env = "FLOCKREEL_OTLP_ENDPOINT", value_name = "URL", value_parser = traces::check_endpoint)]
+    #[arg(long, env = "FLOCKREEL_OTLP_ENDPOINT", value_name = "URL", value_parser = http_address)]
     pub otlp_endpoint: Option<Url>,
+}
+
+/// Returns an address if it is one of HTTP.
+fn http_address(text: &str) -> Result<Url, String> {
+    let url = Url::parse(text).map_err(|error| error.to_string())?;
+    match url.scheme() {
+        "http" | "https" => Ok(url),
+        _ => Err("expected an address such as http://collector:4318".to_owned()),
+    }
 }
 
 /// Location of the database.

@@ -21,8 +21,6 @@ use tracing_subscriber::Layer;
 use tracing_subscriber::filter::filter_fn;
 use tracing_subscriber::registry::LookupSpan;
 
-use crate::store::tls;
-
 /// Header of W3C Trace Context, also the key of its propagator.
 const TRACE_PARENT: &str = "traceparent";
 /// Path of spans at a collector, by the specification of OTLP over HTTP.
@@ -46,10 +44,9 @@ impl Drop for Exporter {
 }
 
 impl Exporter {
-    /// Starts the export to the collector at `endpoint`, which has passed [`check_endpoint`]. Whether the collector
-    /// answers is not checked.
+    /// Starts the export to the collector at this address. A cryptography library for TLS must have been selected.
+    /// Whether the collector answers is not checked.
     pub fn start(endpoint: &Url) -> Result<Exporter, String> {
-        tls::choose_cryptography();
         let base = endpoint.as_str().trim_end_matches('/');
         let exporter = SpanExporter::builder()
             .with_http()
@@ -77,15 +74,6 @@ impl Exporter {
             .with_threads(false)
             .with_target(false)
             .with_filter(spans.with_max_level_hint(LevelFilter::INFO))
-    }
-}
-
-/// Returns the address of a collector if it is one of HTTP.
-pub fn check_endpoint(endpoint: &str) -> Result<Url, String> {
-    let url = Url::parse(endpoint).map_err(|error| error.to_string())?;
-    match url.scheme() {
-        "http" | "https" => Ok(url),
-        _ => Err("expected an address such as http://collector:4318".to_owned()),
     }
 }
 

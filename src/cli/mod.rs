@@ -40,7 +40,7 @@ pub use progress::Listener;
 use crate::config;
 use crate::logging::{self, LogFormat, say, say_error};
 use crate::media::{self, Tool};
-use crate::store::Spill;
+use crate::store::{Spill, tls};
 use crate::traces::Exporter;
 use flockreel_core::formats::library_dir::{self, StoredLibrary};
 use flockreel_core::scratch::Scratch;
@@ -133,6 +133,9 @@ pub fn main(arguments: &[OsString]) -> ExitCode {
     let default = if serves { "info" } else { "warn" };
     let endpoint =
         monitoring(&cli.command).and_then(|monitoring| monitoring.otlp_endpoint.as_ref());
+    if endpoint.is_some() {
+        tls::choose_cryptography();
+    }
     let exporter = match endpoint.map(Exporter::start).transpose() {
         Ok(exporter) => exporter,
         Err(error) => {

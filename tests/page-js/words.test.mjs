@@ -4,6 +4,8 @@ import { readdirSync, readFileSync } from "node:fs";
 import { test } from "node:test";
 import en from "../../static/words/en.js";
 import ja from "../../static/words/ja.js";
+import service from "../../static/words/service-ja.js";
+import { grouped } from "../../static/js/studio/groups.js";
 
 const STATIC = new URL("../../static/", import.meta.url);
 /** Japanese words without a Japanese letter: names, numbers, units and marks. */
@@ -47,11 +49,11 @@ function keysSaid() {
   return { keys: [...keys], patterns: [...patterns] };
 }
 
-/** Returns the keys that fit a pattern such as `tool.${name}.help`. */
-const fitting = (pattern) => {
+/** Returns the keys of a table that fit a pattern such as `tool.${name}.help`. */
+const fitting = (pattern, table = en) => {
   const [first, ...rest] = pattern.split(/\$\{[^}]*\}/).map((part) => part.replaceAll(".", "\\."));
   const whole = new RegExp(`^${[first, ...rest].join(".+")}$`);
-  return Object.keys(en).filter((key) => whole.test(key));
+  return Object.keys(table).filter((key) => whole.test(key));
 };
 
 test("both languages have the same keys in the same order", () => {
@@ -91,11 +93,25 @@ test("every key that the page says exists", () => {
   const { keys, patterns } = keysSaid();
   assert.ok(keys.length > 100 && patterns.length > 20, "the calls of say are found");
   assert.deepEqual(keys.filter((key) => !(key in en)), []);
-  assert.deepEqual(patterns.filter((pattern) => fitting(pattern).length === 0), []);
+  assert.deepEqual(patterns.filter((pattern) => fitting(pattern, { ...en, ...service }).length === 0), []);
+});
+
+test("Japanese words for what the service says have no Latin letters", () => {
+  assert.deepEqual(wrong(service, (value) => /\p{Script=Latin}/u.test(value) || !/[\p{Script=Hiragana}\p{Script=Katakana}\p{Script=Han}]/u.test(value)), []);
+});
+
+test("Japanese words exist for reasons to refuse and for the help of settings", () => {
+  const codes = [...readFileSync(new URL("../docs/reference/errors.md", STATIC), "utf8").matchAll(/^\| `(\w+)` \|/gm)].map(([, code]) => code);
+  const told = Object.keys(service).filter((key) => key.startsWith("code."));
+  assert.ok(told.length >= 60);
+  assert.deepEqual(told.filter((key) => !codes.includes(key.split(".")[1]) || !(key.replace(/^(code\.\w+)$/, "$1.advice") in service)), []);
+  const settings = [...Object.values(grouped({ has: () => true, values: () => [] })).flat(), "palette", "swim", "bank_rad", "smooth_s", "bridge_s", "length_m", "height_m"];
+  assert.ok(settings.length > 40);
+  assert.deepEqual(settings.filter((name) => Number(`hint.${name}` in ja) + Number(`hint.${name}` in service) !== 1), []);
 });
 
 test("the page says every key", () => {
-  const used = new Set(keysSaid().patterns.flatMap(fitting));
+  const used = new Set(keysSaid().patterns.flatMap((pattern) => fitting(pattern)));
   // Some keys go through a variable before they are said.
   assert.deepEqual(Object.keys(en).filter((key) => !used.has(key) && !page.includes(`"${key}"`)), []);
 });

@@ -400,6 +400,17 @@ def test_a_link_that_the_service_refuses_can_be_mended(page, filled_service):
     assert settings(page) == {}
 
 
+def test_reasons_and_help_of_the_service_are_japanese_on_a_japanese_page(visitor, filled_service):
+    page = visitor(locale="ja-JP")
+    page.goto(f"{filled_service}/studio?frames=60&variation=9")
+    box = page.locator(".trouble .problem")
+    expect(box.locator("strong")).to_have_text(re.compile("[ぁ-ん]"), timeout=PLAN_MS)
+    for text in box.locator("p:not([lang=en], .actions)").all_text_contents():
+        assert not re.search("[A-Za-z]", text), text
+    assert page.locator(".help").count() > 30
+    expect(page.locator(".help[lang=en]")).to_have_count(0)
+
+
 def test_chasing_with_the_pointer_becomes_a_planned_predator(studio):
     page, previews = studio
     expect_animals(page, 6)

@@ -47,6 +47,14 @@ export function say(key, values = {}) {
   });
 }
 
+/** @type {Promise<unknown> | undefined} */
+let ofService;
+/** Adds words for what the service says in English only. Without them, its own words are shown. */
+export function wordsOfService() {
+  ofService ??= true ? Promise.resolve() : import(`../../words/service-${language}.js`).then((words) => Object.assign(table, words.default)).catch(() => { ofService = undefined; });
+  return ofService;
+}
+
 /** Returns the sentence of a key, or `other` if there is none. @param {string} key @param {string} other @param {Values} [values] */
 export const sayOr = (key, other, values) => (table[key] ? say(key, values) : other);
 

@@ -6,6 +6,7 @@ import { element } from "../app/element.js";
 import { forget } from "../app/names.js";
 import { signal } from "../app/store.js";
 import { say } from "../app/words.js";
+import { reasonOf } from "./problem.js";
 
 /** Time in which a deletion can be undone, ms. */
 const UNDO_MS = 10_000;
@@ -56,7 +57,7 @@ export function deleteLater({ id, path, name }) {
       close();
     } catch (problem) {
       mark(id, false);
-      text.textContent = say("undo.failed", { name, reason: /** @type {any} */ (problem).message });
+      text.textContent = say("undo.failed", { name, reason: await reasonOf(problem) });
       button.replaceWith(element("button", { type: "button", onclick: close }, say("dismiss")));
     }
   }

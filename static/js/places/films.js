@@ -9,7 +9,7 @@ import { say, stageOf } from "../app/words.js";
 import { filmCard } from "../parts/cards.js";
 import { fileButton } from "../parts/drop.js";
 import { pinButton, spaceSentence } from "../parts/pin.js";
-import { problemBox } from "../parts/problem.js";
+import { problemBox, reasonOf } from "../parts/problem.js";
 import { deleted, deleteLater } from "../parts/undo.js";
 
 /** Films of a page. */
@@ -65,7 +65,8 @@ export async function show(root, { life }) {
       const mine = jobs.value.filter((job) => job.kind === "analysis" && job.subject?.id === film.id);
       const job = mine.find(isUnderWay) ?? mine[0];
       node.dataset.state = job && isUnderWay(job) ? "running" : library ? "measured" : job?.state === "failed" ? "refused" : "bare";
-      state.textContent = job && isUnderWay(job) ? stageOf(job) : library ? say("film.measured") : job?.state === "failed" ? job.error?.title ?? say("state.failed") : say("film.not_measured");
+      state.textContent = job && isUnderWay(job) ? stageOf(job) : library ? say("film.measured") : say(job?.state === "failed" ? "state.failed" : "film.not_measured");
+      if (node.dataset.state === "refused") reasonOf(job?.error).then((reason) => { if (node.dataset.state === "refused") state.textContent = reason; });
     }
   };
   const fill = async () => {

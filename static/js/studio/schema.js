@@ -1,6 +1,7 @@
 // The settings of a flock, read from the schema of the service.
 // @ts-check
 import { get } from "../app/api.js";
+import { wordsOfService } from "../app/words.js";
 import { proseLimits } from "./limits.js";
 
 /**
@@ -24,7 +25,10 @@ function load() {
 }
 
 /** Returns the fields of a flock, or of a virtual fish. @param {"Flock" | "Fish"} [kind] @returns {Promise<Fields>} */
-export const loadFields = async (kind = "Flock") => fieldsOf(await load(), `${kind}Params`, `${kind}Request`);
+export async function loadFields(kind = "Flock") {
+  const [schemas] = await Promise.all([load(), wordsOfService()]);
+  return fieldsOf(schemas, `${kind}Params`, `${kind}Request`);
+}
 
 /** Returns the defaults of the parameters of an analysis by name. @returns {Promise<Api.AnalysisParams>} */
 export const analysisDefaults = async () => defaultsOf((await load()).AnalysisParams);
