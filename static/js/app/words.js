@@ -51,7 +51,7 @@ export function say(key, values = {}) {
 let ofService;
 /** Adds words for what the service says in English only. Without them, its own words are shown. */
 export function wordsOfService() {
-  ofService ??= true ? Promise.resolve() : import(`../../words/service-${language}.js`).then((words) => Object.assign(table, words.default)).catch(() => { ofService = undefined; });
+  ofService ??= language === "en" ? Promise.resolve() : import(`../../words/service-${language}.js`).then((words) => Object.assign(table, words.default)).catch(() => { ofService = undefined; });
   return ofService;
 }
 
