@@ -226,7 +226,7 @@ export default {
   "reel.file.ground-truth.zip": "マスク、COCO、MOT（追跡手法の学習と評価用）", "reel.file.flock.json": "群れの全データ（プログラム用）", "reel.file.flock.plan": "各個体のフレームと描画位置（別の環境での描画用、小容量）", "reel.file.plan.svg": "方向のグラフ（論文用）",
   "reel.share": "共有", "reel.share.help": "リンクは期限まで、トークンなしで使えます。リンクを知っている人が開けるのは、共有したものだけです。",
   "reel.share.here": "リンクのアドレスが{host}で始まるため、このコンピューターでしか開けません。",
-  "reel.link.page": "動画のページ", "reel.link.file": "共有するもの", "reel.link.lasting": "有効期間", "reel.link.hour": "1時間", "reel.link.day": "1日", "reel.link.week": "1週間", "reel.link.make": "リンクを作成", "reel.link.until": "期限 {time}",
+  "reel.link.page": "動画のページ", "reel.link.file": "共有するもの", "reel.link.lasting": "有効期間", "reel.link.hour": "1時間", "reel.link.day": "1日", "reel.link.week": "1週間", "reel.link.make": "リンクを作成", "reel.link.until": "期限 {time}", "reel.link.qr": "QRコード", "reel.link.qr.none": "リンクが長すぎて、QRコードにできません。",
   "shared.title": "{n}個体の群れの動画", "shared.does.flee": "{title}（逃げる群れ）", "shared.does.school": "{title}（同じ向きに動く群れ）", "shared.does.loose": "{title}（ゆるやかにまとまった群れ）", "shared.does.swarm": "{title}（向きがばらばらの群れ）", "shared.does.mill": "{title}（旋回する群れ）",
   "shared.what": "どの個体も、撮影した同じ1個体です。", "shared.save": "動画を保存", "shared.save_clear": "背景が透明な動画を保存", "shared.save_opaque": "背景つきで保存", "shared.unplayable": "このブラウザーでは動画を再生できません。保存して、別のアプリで開いてください。",
   "shared.over": "リンクの期限が切れています", "shared.over.help": "{time}まで有効でした。新しいリンクを受け取ってください。",

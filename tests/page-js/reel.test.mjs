@@ -5,6 +5,7 @@ import { test } from "node:test";
 // The page's words ask the browser for its language.
 Object.assign(globalThis, { location: new URL("http://page/"), localStorage: { getItem: () => null }, navigator: { languages: ["en"] }, document: { documentElement: {} } });
 const { piecesOf } = await import("../../static/js/reel/pieces.js");
+const { qrOf } = await import("../../static/js/reel/qr.js");
 const { changedOf, filesOf, filmFileOf, savedName, sharedFilesOf, studioAddress } = await import("../../static/js/reel/settings.js");
 const { pathOf, readLink } = await import("../../static/js/reel/shared-link.js");
 const { sharedTitle } = await import("../../static/js/reel/shared-title.js");
@@ -25,6 +26,12 @@ test("the title of a shared reel tells the film and what its flock does", () => 
   assert.equal(sharedTitle(plan(null, { milling: 0.7 }), saved("two.dots")), "40 × two.dots, circling");
   assert.equal(sharedTitle(plan(null, { milling: 0, polarization: 0.9 }, 1), saved("魚")), "1 × 魚");
   assert.equal(sharedTitle(plan(null, {}), ""), "A film of 40 animals, heading in different directions");
+});
+
+test("a QR code is as large as its text needs", () => {
+  const sideOf = (length) => qrOf("a".repeat(length))?.length;
+  assert.deepEqual([17, 18, 106, 107, 230, 231, 425].map(sideOf), [21, 25, 37, 41, 53, 57, 69]);
+  assert.equal(qrOf("a".repeat(426)), null);
 });
 
 test("settings that are the default are left out", () => {

@@ -9,6 +9,7 @@ import urllib.request
 import zipfile
 
 import pytest
+import zxingcpp
 from playwright.sync_api import expect
 
 from service import post, wait_for_job
@@ -208,6 +209,39 @@ def test_a_page_for_friends_plays_the_film_without_a_token(reel, browser, flock)
     friend.goto(link.rsplit("~", 1)[0])
     expect(heading(friend)).to_have_text(say(friend, "shared.broken"))
     context.close()
+
+
+# The brightness of a drawn QR code, as hexadecimal digits, and its width.
+BRIGHTNESS = """async (svg) => {
+    const side = 6 * svg.viewBox.baseVal.width;
+    const file = new XMLSerializer().serializeToString(svg).replace(/ width="\\d+"/, ` width="${side}" height="${side}"`);
+    const picture = Object.assign(new Image(), { src: `data:image/svg+xml,${encodeURIComponent(file)}` });
+    await picture.decode();
+    const context = Object.assign(document.createElement("canvas"), { width: side, height: side }).getContext("2d");
+    context.drawImage(picture, 0, 0);
+    const { data } = context.getImageData(0, 0, side, side);
+    return [Array.from({ length: side * side }, (_, k) => (data[4 * k] > 127 ? "f" : "0")).join(""), side];
+}"""
+
+
+def read_qr(svg):
+    """Returns the text of a drawn QR code."""
+    light, side = svg.evaluate(BRIGHTNESS)
+    picture = memoryview(bytes(255 * (one == "f") for one in light)).cast("B", (side, side))
+    return [found.text for found in zxingcpp.read_barcodes(picture)]
+
+
+def test_the_qr_code_of_a_link_is_read_as_the_link(reel):
+    reel.get_by_role("button", name="Make a link").click()
+    link = reel.locator(".links pre").text_content()
+    reel.get_by_text(say(reel, "reel.link.qr"), exact=True).click()
+    code = reel.get_by_role("img", name=say(reel, "reel.link.qr"))
+    assert read_qr(code) == [link]
+    draw = """(svg, text) => import("/static/js/reel/qr.js").then(({ qrOf, qrPicture }) => svg.replaceWith(qrPicture(qrOf(text), svg.getAttribute("aria-label"))))"""
+    for length in (30, 54, 79, 107, 135, 155, 193, 231, 272, 300, 367, 425):
+        text = (link * 3)[:length]
+        code.evaluate(draw, text)
+        assert read_qr(code) == [text], length
 
 
 def test_a_page_for_friends_ends_when_the_flock_is_deleted(page, visitor, filled_service):

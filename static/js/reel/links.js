@@ -50,5 +50,17 @@ function row(name, { url, expires_at }) {
   const text = element("pre", { tabIndex: 0 }, url);
   const copy = copyTextOf(text, say("share.copy"));
   copy.setAttribute("aria-label", say("share.copy.of", { name }));
-  return element("li", {}, element("div.way-head", {}, element("span", {}, element("strong", {}, name), " ", element("small", {}, say("reel.link.until", { time: day(expires_at) }))), copy), text);
+  return element("li", {}, element("div.way-head", {}, element("span", {}, element("strong", {}, name), " ", element("small", {}, say("reel.link.until", { time: day(expires_at) }))), copy), text, qrCode(url));
+}
+
+/** Returns a part that opens and shows a link as a QR code. @param {string} url */
+function qrCode(url) {
+  const open = async () => {
+    if (!node.open || node.childElementCount > 1) return;
+    const { qrOf, qrPicture } = await import("./qr.js");
+    const rows = qrOf(url);
+    node.append(rows ? qrPicture(rows, say("reel.link.qr")) : say("reel.link.qr.none"));
+  };
+  const node = element("details", { ontoggle: () => open().catch(() => { node.open = false; }) }, element("summary", {}, say("reel.link.qr")));
+  return node;
 }
