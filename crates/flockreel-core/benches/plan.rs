@@ -78,7 +78,7 @@ fn time(
     n_threads: usize,
     n_runs: u32,
 ) -> f64 {
-    let motion = motion_of(library, &Lens::of(library, params));
+    let motion = motion_of(library, &Lens::new(library, params));
     let run = || {
         let model = Model::new(library, &motion, params);
         let plans = Planner::new(&model, boids).plan(&Silent);

@@ -47,7 +47,7 @@ pub struct Pinhole {
 
 impl Lens {
     /// Returns the lens of a library. It is flat in top view, and if `depth_bl` is 0.
-    pub fn of(library: &Library, params: &Params) -> Lens {
+    pub fn new(library: &Library, params: &Params) -> Lens {
         let poses = &library.poses;
         let length_px = rounded(library.stats.length_px.unwrap_or(1.0).max(1.0), 2);
         let flat = poses.view == View::Top || params.depth_bl == Some(0.0);
@@ -358,7 +358,7 @@ mod tests {
     #[test]
     fn animal_that_stretches_in_place_keeps_its_depth() {
         let mut library = crate::flock::synthetic::library(View::Side);
-        let lens = Lens::of(&library, &Params::default());
+        let lens = Lens::new(&library, &Params::default());
         let fps = library.poses.fps;
         for (frame, pose) in library.poses.frames.iter_mut().enumerate() {
             let stretched = libm::sin(frame as f64 / fps);

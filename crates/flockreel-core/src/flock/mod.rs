@@ -106,7 +106,7 @@ pub fn plan_flock(
     if library.playback.component.is_empty() || library.playback.jumps.is_empty() {
         return Err(Error::NoTransitions);
     }
-    let lens = Lens::of(library, params);
+    let lens = Lens::new(library, params);
     let mut params = resolved(params, &lens);
     let motion = motion_of(library, &lens);
     let tank = Tank::from_library(library, &lens, &motion, &params);
@@ -148,7 +148,7 @@ pub fn plan_flock(
         fps,
         image_size_px: library.poses.image_size_px,
         length_px: lens.length_px,
-        space: Space::of(&lens, &tank),
+        space: Space::new(&lens, &tank),
         stats: Stats {
             room_for,
             ..measured(&individuals, &course.orders, library, params, &tank)
@@ -168,7 +168,7 @@ fn measured(
     params: &Params,
     tank: &Tank,
 ) -> Stats {
-    let length_px = Lens::of(library, params).length_px;
+    let length_px = Lens::new(library, params).length_px;
     let crowding = density::crowding(individuals, library, length_px);
     let places_px = individuals.iter().map(|one| &one.centroid_px[..]);
     Stats {

@@ -22,7 +22,7 @@ pub struct Space {
 
 impl Space {
     /// Returns the geometry of a tank that is seen through a lens.
-    pub fn of(lens: &Lens, tank: &Tank) -> Space {
+    pub fn new(lens: &Lens, tank: &Tank) -> Space {
         let wall = |wall: &Wall| Wall {
             outward: wall.outward.map(|part| rounded(part, 6)),
             offset_bl: rounded(wall.offset_bl, 4),
@@ -78,7 +78,7 @@ mod tests {
         };
         let lens = Lens::with(90.0, Some(camera));
         let tank = Tank::new([-3.0, -2.0, 7.5], [3.0, 2.0, 10.0]);
-        let space = Space::of(&lens, &tank);
+        let space = Space::new(&lens, &tank);
         for place in [[0.5, -1.0, 7.5], [-2.0, 1.5, 9.75]] {
             let [x, y] = lens.picture_px(place);
             let found = place_bl(&space, [x, y, (place[2] - 7.5) * 90.0]);

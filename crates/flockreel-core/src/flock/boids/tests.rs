@@ -20,7 +20,7 @@ fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Ve
         [0.5, 0.5, 0.0],
         [15.5, 11.5, if view == View::Side { 3.0 } else { 0.0 }],
     );
-    let lens = Lens::of(&library, params);
+    let lens = Lens::new(&library, params);
     let mut boids = Boids::new(params, &calibration, &lens, &tank, 30.0);
     let (mut positions, mut velocities) = (Vec::new(), Vec::new());
     for _ in 0..n_frames {
@@ -32,7 +32,7 @@ fn swim(view: View, params: &Params, n_frames: usize) -> (Vec<Vec<Vec3>>, Vec<Ve
 }
 
 fn calibrated(library: &Library, params: &Params) -> Calibration {
-    let lens = Lens::of(library, params);
+    let lens = Lens::new(library, params);
     Calibration::from_library(library, &motion_of(library, &lens), lens.is_flat())
 }
 
@@ -142,7 +142,7 @@ fn slopes_in_space_stay_within_the_measured_limits() {
 fn slopes_in_the_image_stay_within_the_limits_where_those_in_space_allow_it() {
     let library = synthetic::library(View::Side);
     let params = preset("swarm");
-    let (calibration, lens) = (calibrated(&library, &params), Lens::of(&library, &params));
+    let (calibration, lens) = (calibrated(&library, &params), Lens::new(&library, &params));
     let slopes = calibration.slopes.expect("side view has a reach");
     let (positions, velocities) = swim(View::Side, &params, 300);
     for (&p, &v) in positions.iter().flatten().zip(velocities.iter().flatten()) {
@@ -211,7 +211,7 @@ fn slow_school_is_polarized_in_perspective_too() {
             seed,
             ..preset("school")
         };
-        let lens = Lens::of(&library, &params);
+        let lens = Lens::new(&library, &params);
         let tank = Tank::from_library(&library, &lens, &motion_of(&library, &lens), &params);
         let mut boids = Boids::new(&params, &calibration, &lens, &tank, 30.0);
         let orders = (0..400).map(|_| {

@@ -91,7 +91,7 @@ impl<'a> Costs<'a> {
 
     /// Returns the features of each state.
     fn shown(&self) -> Vec<Feature> {
-        let motion = motion_of(self.library, &Lens::of(self.library, &self.flock.params));
+        let motion = motion_of(self.library, &Lens::new(self.library, &self.flock.params));
         let feature = |&(frame, is_mirrored): &(u32, bool)| {
             let moved = &motion[frame as usize];
             let ([x, y], turn) = (moved.velocity_bl_per_s, moved.turn_rad_per_s);

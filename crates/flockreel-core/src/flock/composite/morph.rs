@@ -31,7 +31,7 @@ pub(super) fn warp_together(main: &mut Resampled, second: &mut Resampled, weight
         return;
     }
     let (a, b) = (grown(main, rect), grown(second, rect));
-    let (small_a, small_b) = (Half::of(&a, rect), Half::of(&b, rect));
+    let (small_a, small_b) = (Half::new(&a, rect), Half::new(&b, rect));
     let (forth, back) = (
         Flow::between(&small_a, &small_b),
         Flow::between(&small_b, &small_a),
@@ -64,7 +64,7 @@ struct Half {
 }
 
 impl Half {
-    fn of(pixels: &[Quad], rect: Rect) -> Half {
+    fn new(pixels: &[Quad], rect: Rect) -> Half {
         let (width, height) = (rect.w as usize / 2, rect.h as usize / 2);
         let stride = rect.w as usize;
         let mut values = Vec::with_capacity(width * height);

@@ -66,14 +66,14 @@ pub(super) fn simulate_loop(
     let mut lead = Vec::with_capacity(n_lead);
     for _ in 0..n_lead {
         step()?;
-        lead.push(Snapshot::of(&boids));
+        lead.push(Snapshot::new(&boids));
         boids.advance();
     }
     let mut continuations = Vec::new();
     let mut snapshots = Vec::with_capacity(n_frames);
     for t in 0..n_frames {
         step()?;
-        snapshots.push(Snapshot::of(&boids));
+        snapshots.push(Snapshot::new(&boids));
         let left = n_frames - t;
         if left == n_lead {
             continuations = seam::continuations(&snapshots[t], &lead);

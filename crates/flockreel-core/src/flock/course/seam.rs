@@ -130,7 +130,7 @@ pub(super) fn blend_into_lead(
 
 impl Snapshot {
     /// Returns the current moment of the boids.
-    pub(super) fn of(boids: &Boids) -> Snapshot {
+    pub(super) fn new(boids: &Boids) -> Snapshot {
         Snapshot {
             positions: boids.positions().to_vec(),
             velocities: boids.velocities().to_vec(),

@@ -340,7 +340,7 @@ mod tests {
     fn steps_stay_near_the_filmed_ones_far_from_the_boid() {
         for view in [View::Side, View::Top] {
             let (library, params) = (synthetic::library(view), Params::default());
-            let lens = Lens::of(&library, &params);
+            let lens = Lens::new(&library, &params);
             let motion = motion_of(&library, &lens);
             let tank = Tank::from_library(&library, &lens, &motion, &params);
             let calibration = Calibration::from_library(&library, &motion, lens.is_flat());

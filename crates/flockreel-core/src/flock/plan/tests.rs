@@ -140,7 +140,7 @@ fn plan_is_the_cheapest_and_the_jump_back_cost_reduces_repeats() {
         params.matching.w_p = 0.15;
         let aware = plan_flock(&library, &params, &Silent).unwrap();
         let boids = [aware.individuals[0].boid.clone()];
-        let motion = motion_of(&library, &Lens::of(&library, &aware.params));
+        let motion = motion_of(&library, &Lens::new(&library, &aware.params));
         let model = Model::new(&library, &motion, &aware.params);
         let planner = Planner::new(&model, &boids);
         let wanted = planner.model.weights.wanted(&boids[0], planner.model.fps);
@@ -172,7 +172,7 @@ fn loop_plan_is_the_cheapest_that_leads_to_its_continuation() {
         let flock = plan_flock(&library, &params, &Silent).unwrap();
         let one = &flock.individuals[0];
         let boids = [one.boid.clone()];
-        let motion = motion_of(&library, &Lens::of(&library, &flock.params));
+        let motion = motion_of(&library, &Lens::new(&library, &flock.params));
         let model = Model::new(&library, &motion, &flock.params);
         let mut planner = Planner::new(&model, &boids);
         let wanted = [planner.model.weights.wanted(&boids[0], planner.model.fps)];
@@ -254,7 +254,7 @@ fn matching_by_position_follows_boid_velocities_better_than_by_heading() {
         };
         (params.matching.by, params.matching.w_v) = (by, 0.1);
         let flock = plan_flock(&library, &params, &Silent).expect("a good library");
-        let motion = motion_of(&library, &Lens::of(&library, &flock.params));
+        let motion = motion_of(&library, &Lens::new(&library, &flock.params));
         let gaps = flock.individuals.iter().flat_map(|individual| {
             (0..individual.source_frame.len()).map(|t| {
                 let [x, y] = motion[individual.source_frame[t] as usize].velocity_bl_per_s;

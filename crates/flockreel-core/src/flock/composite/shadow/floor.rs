@@ -48,7 +48,7 @@ pub(super) struct Ellipse {
 impl Floor {
     /// Returns the floor: half a body height below the lowest position of any individual in any frame.
     pub(super) fn new(library: &Library, flock: &Flock) -> Floor {
-        let lens = Lens::of(library, &flock.params);
+        let lens = Lens::new(library, &flock.params);
         let tank = Tank::from_library(library, &lens, &motion_of(library, &lens), &flock.params);
         let mut floor = Floor {
             lens,
