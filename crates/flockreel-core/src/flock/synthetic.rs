@@ -211,9 +211,10 @@ fn draw(rgba: &mut [u8], pose: &Pose, frame: u32) {
         let tail = (1.0 - ((along + 0.8) / 0.25).powi(2)) - ((across - tail_center) / 6.0).powi(2);
         let alpha = (body.max(tail) * 5.0).clamp(0.0, 1.0);
         let eye = (along - 0.6).powi(2) * half * half + (across + 2.0).powi(2) < 3.0;
-        let color = match eye {
-            true => [10, 10, 20],
-            false => [240, (130.0 - 4.0 * across).clamp(60.0, 200.0) as u8, 40],
+        let color = if eye {
+            [10, 10, 20]
+        } else {
+            [240, (130.0 - 4.0 * across).clamp(60.0, 200.0) as u8, 40]
         };
         pixel[..3].copy_from_slice(&color);
         pixel[3] = (255.0 * alpha).round() as u8;

@@ -252,10 +252,8 @@ impl Weights {
                 let [x, y] = moved.velocity_bl_per_s;
                 return velocity_feature([if mirrored { -x } else { x }, y]);
             }
-            let (x, turn) = match mirrored {
-                false => (1.0, moved.turn_rad_per_s),
-                true => (-1.0, -moved.turn_rad_per_s),
-            };
+            let x = if mirrored { -1.0 } else { 1.0 };
+            let turn = x * moved.turn_rad_per_s;
             let heading = match (self.by, mirrored) {
                 (MatchBy::Direction, _) => libm::atan2(moved.forward[1], x * moved.forward[0]),
                 (_, false) => moved.heading_rad,

@@ -103,9 +103,10 @@ fn apply_sums<'a, const BACKWARD: bool>(
             for (differences, out) in differences.zip(out) {
                 for (moment, differences) in differences.iter_mut().enumerate() {
                     let differences = std::mem::take(differences);
-                    running[moment] = match BACKWARD {
-                        false => running[moment].wrapping_add(differences),
-                        true => running[moment].wrapping_sub(differences),
+                    running[moment] = if BACKWARD {
+                        running[moment].wrapping_sub(differences)
+                    } else {
+                        running[moment].wrapping_add(differences)
                     };
                     let lane = if BACKWARD {
                         FRAMES - 1 - moment
