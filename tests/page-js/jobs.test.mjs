@@ -45,7 +45,7 @@ test("the time left never rises within a stage, and is told only while the speed
   assert.ok(told[0] > 40 && told.at(-1) < 8, String(told));
   // The work halts: no number is better than one that grows.
   assert.equal(at(90, 0.955), null);
-  assert.equal(at(91, 1), null);
+  assert.equal(at(91, 0.996), null);
 });
 
 test("at the end of a job the page tells what happens, and no whole percentage", () => {

@@ -103,7 +103,7 @@ export function direction(heading_rad) {
 export const heading = (heading_rad) => `${whole.format(degrees(heading_rad)).replace("-", "−")}° (${direction(heading_rad)})`;
 
 /** Progress of a job from which all is computed, and only its files are being written. */
-const COMPUTED = 0.995;
+export const COMPUTED = 0.995;
 
 /** Returns the state of a job as text, while it runs with its stage and progress. @param {Api.Job} job */
 export function stageOf(job) {

@@ -1,6 +1,7 @@
 // The time left of a job, from the speed of its present stage. It never rises within a stage, and nothing is told while it
 // is unknown.
 // @ts-check
+import { COMPUTED } from "../app/words.js";
 
 /** Time of a stage after which its speed is known, s. */
 const KNOWN_S = 5;
@@ -13,7 +14,7 @@ export function timeLeft() {
   return (/** @type {Pick<Api.Job, "stage" | "progress">} */ job, /** @type {number} */ now_ms) => {
     if (job.stage !== stage) [stage, from, from_ms, end_ms] = [job.stage ?? "", job.progress, now_ms, Infinity];
     const spent_ms = now_ms - from_ms;
-    if (spent_ms < KNOWN_S * 1000 || job.progress <= from || job.progress >= 1) return null;
+    if (spent_ms < KNOWN_S * 1000 || job.progress <= from || job.progress >= COMPUTED) return null;
     const left_ms = (spent_ms * (1 - job.progress)) / (job.progress - from);
     const told_ms = end_ms - now_ms;
     if (left_ms > DOUBTFUL * told_ms) return null;
