@@ -166,7 +166,17 @@ fn code_of_io(error: &std::io::Error) -> Code {
 
 #[cfg(test)]
 mod tests {
+    use std::io::ErrorKind;
+
     use super::*;
+
+    #[test]
+    fn error_of_a_full_disk_has_its_code() {
+        for kind in [ErrorKind::StorageFull, ErrorKind::QuotaExceeded] {
+            assert_eq!(Error::Io(kind.into()).code(), Code::StorageFull);
+        }
+        assert_eq!(Error::Io(ErrorKind::NotFound.into()).code(), Code::Internal);
+    }
 
     #[test]
     fn failed_start_or_kill_of_a_tool_is_transient_and_bad_input_is_not() {
