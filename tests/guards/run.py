@@ -15,6 +15,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -135,15 +136,17 @@ def run(programs, test, off, longest_s):
         program = programs["it" if kind == "scale" else kind]
         command = [program, "--exact", path, "--nocapture"] + (["--ignored"] if kind == "scale" else [])
     environment = {**os.environ, "FLOCKREEL_GUARD_OFF": off or "", "CARGO_MANIFEST_DIR": str(SOURCES)}
+    # A session of its own, so that the services of a hanging test end with it.
+    running = subprocess.Popen(command, cwd=SOURCES, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True)
     try:
-        done = subprocess.run(command, cwd=SOURCES, env=environment, capture_output=True, text=True, errors="replace", timeout=longest_s)
+        stdout, stderr = running.communicate(timeout=longest_s)
     except subprocess.TimeoutExpired:
+        os.killpg(running.pid, signal.SIGKILL)
+        running.communicate()
         return f"did not end in {longest_s:.0f} s"
-    if kind not in ("contract", "stress") and "running 1 test" not in done.stdout:
+    if kind not in ("contract", "stress") and "running 1 test" not in stdout:
         sys.exit(f"guards: the test does not exist: {test}")
-    if done.returncode == 0:
-        return None
-    return reason(done.stderr + done.stdout)
+    return reason(stderr + stdout) if running.returncode else None
 
 
 def reason(said):
