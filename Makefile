@@ -74,7 +74,7 @@ contract-test: target/vendor ## test the API against its OpenAPI document, with 
 	$(CARGO) test --locked --workspace --no-run
 	@scripts/python-tests.sh contract $(DEBUG)
 
-stress-test: target/vendor ## lose the power, let steps fail, send too much: make stress-test [CASES=all]
+stress-test: target/vendor ## lose the power, let steps fail, send too much: make stress-test [CASES=400]
 	$(CARGO) test --locked --workspace --no-run
 	@scripts/system-packages.sh test contract-test
 	python3 -B tests/stress/power_loss.py $(DEBUG)

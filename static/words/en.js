@@ -247,7 +247,7 @@ export default {
   "fish.view": "Viewpoint", "fish.view.near": "Near it", "fish.view.whole": "Whole path", "fish.view.filmed": "As filmed",
   "fish.turn": "Turn and zoom", "fish.turn.left": "Turn left", "fish.turn.right": "Turn right", "fish.turn.up": "Turn up", "fish.turn.down": "Turn down", "fish.turn.nearer": "Nearer", "fish.turn.farther": "Farther", "fish.turn.reset": "Reset the view",
   "fish.keys": "Drag to turn, wheel or two fingers to zoom. Keys: Space plays, ← → one frame (with Shift ten), Home and End, + and − zoom, 0 resets the view.", "fish.keys.flat": "Keys: Space plays, ← → one frame (with Shift ten), Home and End.",
-  "fish.options": "Another fish", "fish.papers": "As in the paper", "fish.papers.help": "The paper of 2011 has a stiff, upright fish and values that are not smoothed.",
+  "fish.options": "Another fish", "fish.papers": "As in the paper", "fish.papers.help": "The fish of Nakajima et al. is stiff and upright, and follows values that are not smoothed.",
   "set.palette": "Colors", "set.palette.goldfish": "Goldfish", "set.palette.silver": "Silver", "set.palette.bronze": "Bronze", "set.swim": "The body bends", "set.bank_rad": "Largest roll in a turn (degrees)",
   "set.smooth_s": "Smoothing (seconds)", "set.bridge_s": "Longest gap to fill (seconds)", "set.length_m": "Length (cm)", "set.height_m": "Height with fins (cm)",
   "fish.rigid": "stiff", "fish.upright": "upright", "fish.shown": "shown here",
