@@ -4,9 +4,12 @@
 use std::fs::File;
 use std::io::{PipeReader, Read, pipe};
 use std::net::TcpListener;
+use std::os::fd::AsRawFd;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use rustix::fs::{Mode, OFlags, open};
+use rustix::io::write;
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::common::{Place, client};
@@ -148,8 +151,16 @@ async fn stalled_reader_of_stderr_does_not_delay_responses() {
         service.assert_answers(50).await;
         assert!(start.elapsed() < 6 * PATIENCE, "no line was lost");
     }
+    fill(&reader);
     assert_eq!(service.terminate(), Some(0));
     drop(reader);
+}
+
+/// Writes to a pipe until not a single byte fits.
+fn fill(pipe: &PipeReader) {
+    let path = format!("/proc/self/fd/{}", pipe.as_raw_fd());
+    let filler = open(path, OFlags::WRONLY | OFlags::NONBLOCK, Mode::empty()).unwrap();
+    while write(&filler, b" ").is_ok() {}
 }
 
 #[tokio::test(flavor = "multi_thread")]

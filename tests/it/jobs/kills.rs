@@ -205,9 +205,7 @@ async fn stopping_server_refuses_new_requests_and_finishes_running_ones() {
     let refused = server.upload(numbered_film(2)).await;
     assert_eq!(refused.headers()["retry-after"], "5");
     assert_eq!(code_of(refused, 503).await, "stopping");
-    while row_of(&place, &job).await.state != JobState::Queued {
-        tokio::time::sleep(Duration::from_millis(50)).await;
-    }
+    server.job_when(&job, |job| job["state"] == "queued").await;
     // Without its jobs a service that did not wait for uploads would now end.
     tokio::time::sleep(Duration::from_millis(500)).await;
     go_on.send(()).unwrap();
