@@ -169,7 +169,7 @@ page-bench: vendor build target/bench-venv/ready ## measure the page in Chromium
 	$(BENCH) bench/measurements.py
 
 screenshots: vendor build ## make pictures of every place of the page and a recording, in target/screenshots
-	@scripts/system-packages.sh page-test
+	@scripts/system-packages.sh page-test screenshots
 	@scripts/venv.sh target/page-venv tests/page/requirements.txt
 	target/page-venv/bin/python -B scripts/screenshots.py $(RELEASE) target/screenshots
 

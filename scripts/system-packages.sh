@@ -3,7 +3,8 @@
 # this list.
 #
 #   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | scale-test |
-#                                           truth-test | page-test | contract-test | fuzz | bench | arm-test
+#                                           truth-test | page-test | screenshots | contract-test | fuzz |
+#                                           bench | arm-test
 #
 # Prints the packages that it installs. Uses sudo if it does not run as root. Exits with 1 if a package is
 # still missing afterwards.
@@ -37,6 +38,7 @@ bench     wrk       wrk
 bench     nginx     nginx-light
 bench     curl      curl
 page-test chromium  chromium
+screenshots /usr/share/fonts/opentype/ipafont-gothic/ipag.ttf fonts-ipafont-gothic
 arm-test  aarch64-linux-gnu-gcc gcc-aarch64-linux-gnu
 arm-test  /usr/aarch64-linux-gnu/lib/libc.so.6 libc6-dev-arm64-cross
 arm-test  qemu-aarch64 qemu-user
@@ -51,6 +53,7 @@ has() {
         python3) command -v python3 >/dev/null && python3 -c 'import ensurepip, venv' 2>/dev/null ;;
         # Debian keeps the programs of the server outside PATH, in one folder per version.
         initdb) ls /usr/lib/postgresql/*/bin/initdb >/dev/null 2>&1 ;;
+        /*) [ -e "$1" ] ;;
         *) command -v "$1" >/dev/null ;;
     esac
 }
