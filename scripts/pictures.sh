@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the pictures of the README with flockreel: scripts/pictures.sh [PROGRAM]
+# Makes the pictures of the README and the tutorial with flockreel: scripts/pictures.sh [PROGRAM]
 set -euo pipefail
 cd "$(dirname "$0")/.."
 program=$(realpath "${1:-target/release/flockreel}")
@@ -18,4 +18,5 @@ still "$work/film.mp4" 400 film.jpg ""
 still "$work/flock.mp4" 300 flock.jpg ""
 still "$work/fish.mp4" 400 fish.jpg ",scale=800:-2"
 ffmpeg -nostdin -v error -y -i "$work/distance.png" -vf scale=360:-2 -q:v 4 docs/distance.jpg
+ffmpeg -nostdin -v error -y -i "$work/library/transitions.svg" -vf scale=720:-2 -q:v 5 docs/transitions.jpg
 ls -l docs
