@@ -202,10 +202,9 @@ pub struct Monitoring {
 /// Returns an address if it is one of HTTP.
 fn http_address(text: &str) -> Result<Url, String> {
     let url = Url::parse(text).map_err(|error| error.to_string())?;
-    match url.scheme() {
-        "http" | "https" => Ok(url),
-        _ => Err("expected an address such as http://collector:4318".to_owned()),
-    }
+    let is_http = matches!(url.scheme(), "http" | "https");
+    let wrong = || "expected an address such as http://collector:4318".to_owned();
+    is_http.then_some(url).ok_or_else(wrong)
 }
 
 /// Location of the database.
@@ -286,11 +285,6 @@ impl JobSettings {
     pub const JOB_TIME_S: u64 = 6 * 3600;
     /// Default memory limit of a job, bytes: as much as a media tool may use. The largest flock takes less than half.
     pub const JOB_MEMORY_BYTES: u64 = 4 << 30;
-
-    /// Returns the number of threads that one worker may use, as [`threads_per_worker`] does.
-    pub fn threads_per_worker(&self) -> usize {
-        threads_per_worker(self.workers)
-    }
 }
 
 /// Returns the number of threads that each of `workers` workers may use, at least 1. The worker for small jobs is
@@ -394,14 +388,7 @@ mod tests {
         assert_eq!("sqlite:///a/b.db".parse(), sqlite("/a/b.db"));
         let server = "postgres://h/name".to_owned();
         assert_eq!(server.parse(), Ok(Database::Postgres(server)));
-        for wrong in [
-            "sqlite:",
-            "sqlite://",
-            "sqlite:///",
-            "sqlite:..",
-            "mysql://h",
-            "",
-        ] {
+        for wrong in "sqlite: sqlite:// sqlite:/// sqlite:.. mysql://h ".split(' ') {
             let sentence = wrong.parse::<Database>().unwrap_err();
             assert!(sentence.starts_with("the database must be"), "{wrong}");
         }

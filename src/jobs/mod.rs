@@ -48,7 +48,7 @@ pub use id_sequence::IdSequence;
 pub use listener::{Listener, Stages};
 pub use meters::Meters;
 
-use crate::config::{JobSettings, Retention};
+use crate::config::{self, JobSettings, Retention};
 use crate::store::jobs::Kind;
 use crate::store::jobs::enqueue::NewJob;
 use crate::store::jobs::retry::Retry;
@@ -154,7 +154,7 @@ impl Context {
         Context {
             budget: Duration::from_secs(settings.job_time_s),
             memory_bytes: settings.job_memory_bytes,
-            ..Context::new(store, settings.threads_per_worker())
+            ..Context::new(store, config::threads_per_worker(settings.workers))
         }
     }
 
