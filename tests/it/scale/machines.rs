@@ -104,17 +104,15 @@ async fn undisturbed() -> Vec<Vec<u8>> {
     contents
 }
 
-/// Waits until a worker has claimed a job and returns its index.
-async fn at_work(workers: &[WorkerProcess]) -> usize {
+/// Waits until a worker has logged these words, and returns its index.
+async fn when_any(workers: &[WorkerProcess], words: &str) -> usize {
     let begun = Instant::now();
     loop {
-        let busy = workers
-            .iter()
-            .position(|worker| worker.has_logged("job claimed"));
-        if let Some(busy) = busy {
-            return busy;
+        let found = workers.iter().position(|worker| worker.has_logged(words));
+        if let Some(found) = found {
+            return found;
         }
-        assert!(begun.elapsed() < Duration::from_secs(60), "no claim");
+        assert!(begun.elapsed() < Duration::from_secs(60), "{words}");
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
 }
@@ -127,8 +125,9 @@ async fn worker_killed_during_a_job_changes_no_result() {
     let server = Server::start_at(&place);
     let machines = [place.second_machine(), place.second_machine()];
     let mut workers: Vec<_> = machines.iter().map(WorkerProcess::start).collect();
+    when_any(&workers, "waiting for jobs").await;
     let (jobs, files) = queue_everything(&server).await;
-    let killed = workers.remove(at_work(&workers).await);
+    let killed = workers.remove(when_any(&workers, "job claimed").await);
     killed.signal(Signal::KILL);
     drop(killed);
 
