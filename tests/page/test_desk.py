@@ -152,7 +152,7 @@ def test_other_mover_is_ignored_in_its_place_and_time(page, library):
     page.route("**/v1/analyses", lambda route: (sent.append(route.request.post_data_json), route.fulfill(status=422, body="{}")))
     open_desk(page, library[0])
     card = page.locator(".is-mover")
-    expect(card).to_contain_text("Something moves in its place, from 1.0 to 2.5 s")
+    expect(card).to_contain_text("Something moves but stays in its place, from 1.0 to 2.5 s")
     card.get_by_role("button", name="Ignore it").click()
     page.get_by_role("button", name="Measure", exact=True).click()
     until(page, "document.querySelector('.remeasure .problem') !== null")
