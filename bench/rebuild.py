@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Measures how long a change of one line keeps its author waiting, in this checkout and in an older commit.
+"""Measures the time from a change of one line until the tests can run, in this checkout and in an older commit.
 
     bench/rebuild.py COMMIT
 
-Adds a function to a file, builds the tests of its part, and takes the function away again. Lines are those of the
-packages that Cargo compiles anew, their tests included. The older commit is checked out and built in target/rebuild.
+For each file, the script adds a function, builds the tests, and restores the file. The table has the number of source
+lines in the packages that Cargo compiled, with their tests. The older commit is built in target/rebuild.
 """
 import json, pathlib, statistics, subprocess, sys, time
 
@@ -13,7 +13,8 @@ from service import machine
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 N_RUNS = 3
-# What is changed: a file here, the tests here, and the same where all of it was one package.
+# Name of the change; the file and the test options in this checkout; the file and the test options in a commit from
+# before the algorithms became a package.
 CHANGES = [
     ("a handler of the API", "src/api/paging.rs", ["--lib", "--test", "it"], "src/api/paging.rs", ["--lib", "--test", "it"]),
     ("the path of the animal", "crates/flockreel-core/src/analysis/track/path.rs", ["-p", "flockreel-core", "--lib"],

@@ -325,7 +325,7 @@ impl UploadWriter {
         self.n_bytes
     }
 
-    /// Returns whether so many bytes are unconfirmed that they should be confirmed before more are appended.
+    /// Returns whether the unconfirmed bytes have reached their limit. The caller must then confirm them.
     pub fn is_due(&self) -> bool {
         let most = match self.target {
             Target::File(_) => SYNC_BYTES,

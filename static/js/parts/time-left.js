@@ -1,11 +1,11 @@
-// The time left of a job, from the speed of its present stage. It never rises within a stage, and nothing is told while it
-// is unknown.
+// Estimate of a job's remaining time, from the speed of its current stage. Within a stage the estimate never rises.
+// While the speed is unknown there is no estimate.
 // @ts-check
 import { COMPUTED } from "../app/words.js";
 
 /** Time of a stage after which its speed is known, s. */
 const KNOWN_S = 5;
-/** An estimate this many times what was told shows that the speed is unknown. */
+/** An estimate above this multiple of the time shown last means that the speed is unknown. */
 const DOUBTFUL = 1.5;
 
 /** Returns a function that estimates the time left, s, or null. Times are in ms. */

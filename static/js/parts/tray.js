@@ -73,7 +73,7 @@ export function jobCard(job) {
     bar.hidden = !isUnderWay(seen);
     stage.textContent = stageOf(seen);
     more.textContent = isUnderWay(seen) ? [aheadText(seen), leftText(left(seen, Date.now())), seen.attempt > 1 ? say("job.restarted", { n: seen.attempt }) : ""].filter(Boolean).join(" ") : ago(seen.finished_at ?? seen.created_at);
-    // An empty line keeps its place, so that what is told later moves no button.
+    // The line is shown even while it is empty. Otherwise its first text would move the buttons below.
     more.hidden = !isUnderWay(seen) && !more.textContent;
     const state = `${seen.state} ${seen.cancel_requested}`;
     if (state === drawn) return isNamed ? undefined : void tellSubject(seen);

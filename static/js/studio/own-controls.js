@@ -41,7 +41,7 @@ export function seed(field, studio) {
 
 /** The format that a transparent background adds if the files have no other: video.mp4 has no transparency. */
 const ADDED = "webm";
-/** Returns whether the files are the usual ones and that which the background adds. @param {Studio} studio @param {(name: string) => any} valueOf */
+/** Returns whether the files are the usual ones with the one that the background adds. @param {Studio} studio @param {(name: string) => any} valueOf */
 const isImplied = ({ fields }, valueOf) => valueOf("render.background") === "transparent" && String(valueOf("render.formats")) === String([...fields.get("render.formats")?.default ?? [], ADDED]);
 
 /** Plate, transparent or a color. @param {import("./schema.js").Field} field @param {Studio} studio @param {(name: string) => any} valueOf @returns {Control} */
