@@ -24,13 +24,14 @@ COUNTED_S = 4
 LONG_FRAMES = 10_000
 
 # Changes a setting and returns the milliseconds until the canvas shows as many animals as `n`.
-REPLAN = """([selector, n]) => new Promise((resolve) => {
+REPLAN = """([selector, n]) => new Promise((resolve, reject) => {
     const range = document.querySelector(selector), begun = performance.now();
     range.value = String(n);
     range.dispatchEvent(new Event("input", { bubbles: true }));
     const look = () => {
         const name = document.querySelector("canvas[role=img]")?.getAttribute("aria-label") ?? "";
         if (name.includes(String(n))) requestAnimationFrame(() => resolve(performance.now() - begun));
+        else if (performance.now() - begun > 30_000) reject(Error(`the canvas still shows: ${name}`));
         else requestAnimationFrame(look);
     };
     look();

@@ -83,7 +83,8 @@ function slider(field, studio) {
   const range = element("input", { type: "range", "aria-label": title });
   const number = element("input.number", { type: "number", step: "any", inputMode: "decimal" });
   const { node, setReset } = framed(field, studio, { input: number, below: range });
-  let [limits, unit, shown] = [[field.min, field.max], 1, NaN];
+  // The slider's end grows with the value and never comes back, so that it does not move under a hand that drags.
+  let [limits, unit, shown, farthest] = [[field.min, field.max], 1, NaN, 0];
   const send = (/** @type {HTMLInputElement} */ input, /** @type {boolean} */ isFinal) => {
     const asked = Number.parseFloat(input.value) * unit;
     if (!Number.isFinite(asked)) return void (isFinal && (number.value = String(shown)));
@@ -105,7 +106,8 @@ function slider(field, studio) {
       const [least, most] = /** @type {Record<string, number[]>} */ (USUAL)[field.name] ?? limits;
       const known = typeof value === "number" ? value : null;
       shown = known === null ? NaN : round(known / unit);
-      Object.assign(range, { min: Math.max(limits[0], least) / unit, max: Math.min(limits[1], Math.max(most, known ?? 0)) / unit, step: unit === 1 ? field.step : 0.1 });
+      farthest = Math.max(farthest, known ?? 0);
+      Object.assign(range, { min: Math.max(limits[0], least) / unit, max: Math.min(limits[1], Math.max(most, farthest)) / unit, step: unit === 1 ? field.step : 0.1 });
       if (known !== null && Number(range.value) !== shown) range.value = String(shown);
       if (known === null) range.value = range.min;
       range.disabled = number.disabled = isIdle;
