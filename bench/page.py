@@ -44,7 +44,7 @@ FRAMES = """(seconds) => new Promise((resolve) => {
 })"""
 # Presses a key and returns the milliseconds until the reading shows another frame and the browser has drawn it.
 SCRUB = """() => new Promise((resolve) => {
-    const reading = document.querySelector("output.time"), before = reading.textContent, begun = performance.now();
+    const reading = document.querySelector("p.reading"), before = reading.textContent, begun = performance.now();
     document.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight" }));
     const look = () => {
         if (reading.textContent !== before) requestAnimationFrame(() => resolve(performance.now() - begun));

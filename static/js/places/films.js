@@ -42,7 +42,7 @@ export async function show(root, { life }) {
     const name = filmName(film);
     const drop = element("button.quiet.small", { type: "button", "aria-label": say("reels.delete.of", { name }), onclick: () => deleteLater({ id: film.id, path: `/v1/footage/${film.id}`, name }).focus() }, say("film.delete"));
     const pin = pinButton({ path: `/v1/footage/${film.id}`, isPinned: film.pinned, name }, tell);
-    return { film, library, node: filmCard(film, { library, state: element("div.film-foot", {}, state, pin, drop) }), state };
+    return { film, library, node: filmCard(film, { library, state: element("div.card-foot", {}, state, pin, drop) }), state };
   };
   /** Makes the entries of films that are not shown yet. @param {Api.Footage[]} films */
   const entriesOf = async (films) => {

@@ -62,11 +62,11 @@ export async function show(root, { query, life }) {
   };
   const entry = async (/** @type {Api.Flock} */ flock) => {
     const [node, name] = await Promise.all([flockCard(flock), flockName(flock)]);
-    const studio = element("a.button.quiet", { href: `/libraries/${flock.library_id}/studio`, "aria-label": say("reels.studio.of", { name }) }, say("reels.studio"));
+    const studio = element("a.button.quiet.small", { href: `/libraries/${flock.library_id}/studio`, "aria-label": say("reels.studio.of", { name }) }, say("reels.studio"));
     fields.then((known) => { studio.href = studioAddress(flock, known); }).catch(() => {});
-    const drop = element("button.quiet", { type: "button", "aria-label": say("reels.delete.of", { name }), onclick: () => deleteLater({ id: flock.id, path: `/v1/flocks/${flock.id}`, name }).focus() }, say("reel.delete"));
+    const drop = element("button.quiet.small", { type: "button", "aria-label": say("reels.delete.of", { name }), onclick: () => deleteLater({ id: flock.id, path: `/v1/flocks/${flock.id}`, name }).focus() }, say("reel.delete"));
     const pin = pinButton({ path: `/v1/flocks/${flock.id}`, isPinned: flock.pinned, name }, tell);
-    node.append(element("p.actions", {}, studio, pin, drop));
+    node.append(element("div.card-foot", {}, studio, pin, drop));
     return { id: flock.id, name: name.toLocaleLowerCase(), node };
   };
   /** Shows the cards that fit the search. */
