@@ -4,9 +4,9 @@
     bench/rebuild.py COMMIT
 
 For each file, the script adds a function, builds the tests, and restores the file. The table has the number of source
-lines in the packages that Cargo compiled, with their tests. The older commit is built in target/rebuild.
+lines in the packages that Cargo compiled, with their tests. The older commit is checked out and built in a temporary folder.
 """
-import json, pathlib, statistics, subprocess, sys, time
+import json, pathlib, statistics, subprocess, sys, tempfile, time
 
 import measurements
 from service import machine
@@ -52,21 +52,26 @@ def change(folder, file, tests):
     return statistics.median(seconds for seconds, _ in runs), n_lines(runs[0][1])
 
 
-def checkout(commit):
-    old = ROOT / "target/rebuild"
-    if not old.exists():
-        subprocess.run(["git", "worktree", "add", "--detach", old, commit], cwd=ROOT, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        (old / "target").mkdir()
-        (old / "target/vendor").symlink_to(ROOT / "target/vendor")
-    return old
+def checkout(commit, folder):
+    """Checks out a commit outside this checkout, because Cargo would take it for a member of this workspace."""
+    subprocess.run(["git", "worktree", "add", "--detach", folder, commit], cwd=ROOT, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    subprocess.run(["cargo", "fetch", "--locked"], cwd=folder, check=True)
+    (folder / "target").mkdir()
+    (folder / "target/vendor").symlink_to(ROOT / "target/vendor")
 
 
 def main(commit):
-    old, rows = checkout(commit), []
-    for what, file, tests, old_file, old_tests in CHANGES:
-        (before_s, before), (after_s, after) = change(old, old_file, old_tests), change(ROOT, file, tests)
-        rows.append([what, f"{before:,}", f"{after:,}", f"{before_s:.0f} s", f"{after_s:.0f} s", f"{after_s / before_s:.2f}", "<= 0.5"])
-        print(" | ".join(rows[-1]))
+    rows = []
+    with tempfile.TemporaryDirectory() as parent:
+        old = pathlib.Path(parent) / "flockreel"
+        checkout(commit, old)
+        try:
+            for what, file, tests, old_file, old_tests in CHANGES:
+                (before_s, before), (after_s, after) = change(old, old_file, old_tests), change(ROOT, file, tests)
+                rows.append([what, f"{before:,}", f"{after:,}", f"{before_s:.0f} s", f"{after_s:.0f} s", f"{after_s / before_s:.2f}", "<= 0.5"])
+                print(" | ".join(rows[-1]), flush=True)
+        finally:
+            subprocess.run(["git", "worktree", "remove", "--force", old], cwd=ROOT, check=True)
     measurements.save("rebuild", {
         "title": "A change of one line",
         "about": f"Lines that Cargo compiles again, and seconds until the tests run, before the algorithms became a package of their own ({commit}) and now. "
