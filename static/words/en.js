@@ -89,7 +89,7 @@ export default {
   "set.matching.segment_frames": "Frames planned at once", "set.matching.w_h": "Right heading", "set.matching.w_v": "Right speed", "set.matching.w_r": "Little tilt", "set.matching.w_d": "Right direction along the line of sight",
   "set.matching.w_c": "Neighbors look different", "set.matching.w_p": "No repetition", "set.matching.wx": "Few jumps",
   "set.render.background": "Background", "set.background.plate": "Film", "set.background.transparent": "Transparent", "set.background.color": "Color", "set.background.color.pick": "Color of the background",
-  "set.background.note": "You get a transparent WebM film. For editing, also choose MOV or PNG in “Ground truth and files”. The file video.mp4 shows the background of the film all the same.",
+  "set.background.note": "You get a transparent WebM film, and they move in the whole picture. For editing, also choose MOV or PNG in “Ground truth and files”. The file video.mp4 shows the background of the film all the same.",
   "set.render.size_px": "Size", "set.size.film": "As filmed, {size}", "set.render.haze_per_bl": "Paler with distance (haze)", "set.render.shadow": "Shadow",
   "set.look.note": "The preview shows neither size nor shadow; the film does.",
   "set.render.cut": "At a jump", "set.render.cut.fade": "fade", "set.render.cut.morph": "change the shape",

@@ -88,7 +88,7 @@ export default {
   "set.matching.segment_frames": "一度に計画するフレーム数", "set.matching.w_h": "方向の一致", "set.matching.w_v": "速さの一致", "set.matching.w_r": "傾きの小ささ", "set.matching.w_d": "視線方向の一致",
   "set.matching.w_c": "近くの個体との見た目の違い", "set.matching.w_p": "繰り返しの少なさ", "set.matching.wx": "遷移の少なさ",
   "set.render.background": "背景", "set.background.plate": "元の動画", "set.background.transparent": "透明", "set.background.color": "単色", "set.background.color.pick": "背景の色",
-  "set.background.note": "背景が透明なWebMの動画を作成します。編集用には「正解データとファイル」でMOVかPNGも選べます。video.mp4だけは透明にならず、元の動画の背景になります。",
+  "set.background.note": "背景が透明なWebMの動画を作成します。動く範囲は画面全体になります。編集用には「正解データとファイル」でMOVかPNGも選べます。video.mp4だけは透明にならず、元の動画の背景になります。",
   "set.render.size_px": "画像サイズ", "set.size.film": "元の動画と同じ（{size}）", "set.render.haze_per_bl": "遠いほど淡く（かすみ）", "set.render.shadow": "影",
   "set.look.note": "画像サイズと影は、プレビューには反映されませんが、動画には反映されます。",
   "set.render.cut": "遷移のつなぎ方", "set.render.cut.fade": "クロスフェード", "set.render.cut.morph": "モーフィング",

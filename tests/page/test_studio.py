@@ -287,15 +287,27 @@ def test_backgrounds_are_in_sight_without_opening_a_group(studio):
     assert page.locator(".studio-panel details[open]").count() == 0
 
 
-def test_files_that_the_background_implies_are_no_change_of_the_person(studio):
+def test_slider_keeps_the_reach_that_it_once_had(studio):
+    page, _ = studio
+    number(page, "count").fill("200")
+    expect(slider(page, "count")).to_have_attribute("max", "200")
+    slider(page, "count").fill("150")
+    expect(number(page, "count")).to_have_value("150")
+    expect(slider(page, "count")).to_have_attribute("max", "200")
+
+
+def test_what_the_background_implies_is_no_change_of_the_person(studio):
     page, _ = studio
     background = lambda one: page.get_by_role("radio", name=say(page, f"set.background.{one}"), exact=True)  # noqa: E731
     mark = page.locator("#group-files > summary .mark")
     background("transparent").check()
     assert "webm" in settings(page)["render.formats"]
+    # Where the animal was filmed is no longer seen.
+    assert settings(page)["tank"] == "picture"
     expect(mark).to_be_empty()
+    expect(page.locator("#group-move > summary .mark")).to_be_empty()
     background("plate").check()
-    assert "render.formats" not in settings(page)
+    assert not {"render.formats", "tank"} & settings(page).keys()
     background("transparent").check()
     page.locator("#group-files > summary").click()
     page.get_by_role("checkbox", name=say(page, "set.format.gif")).check()

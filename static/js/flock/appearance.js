@@ -11,6 +11,9 @@
  *   Live: the play head rests meanwhile; `at` returns another list only if something has changed
  */
 
+/** What stands behind a transparent flock, as behind its film: pixels of a square, and two grays from 0 to 1. */
+export const CHECKERS = { side: 16, grays: [0.706, 0.561] };
+
 /** @param {import("./plan.js").Plan} plan @param {import("./atlas.js").Atlas} atlas @returns {Source} */
 export function planSource(plan, atlas) {
   const { nFrames, nIndividuals, fps } = plan;

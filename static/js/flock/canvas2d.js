@@ -1,6 +1,6 @@
 // Draws a flock on a 2D canvas, for browsers without WebGL 2. Fades and haze are mixed on a spare canvas.
 // @ts-check
-import { keptColor } from "./appearance.js";
+import { CHECKERS, keptColor } from "./appearance.js";
 
 /** @param {HTMLCanvasElement} canvas @param {import("./drawer.js").Scene} scene @returns {import("./drawer.js").Drawer} */
 export function canvasDrawer(canvas, scene) {
@@ -61,16 +61,20 @@ export function canvasDrawer(canvas, scene) {
   return { setScene: (next) => { scene = next; }, draw, dispose() {} };
 }
 
+/** @param {number} k */
+const gray = (k) => Array(3).fill(CHECKERS.grays[k]);
+
 /** @param {CanvasRenderingContext2D} context @param {import("./drawer.js").Background} background @param {HTMLCanvasElement} canvas */
 function drawBackground(context, { picture, color }, { width, height }) {
   context.setTransform(1, 0, 0, 1, 0, 0);
   context.globalAlpha = 1;
-  context.fillStyle = rgb(color ?? [0.8, 0.8, 0.8]);
+  context.fillStyle = rgb(color ?? gray(0));
   if (picture) context.drawImage(picture, 0, 0, width, height);
   else context.fillRect(0, 0, width, height);
   if (picture || color) return;
-  context.fillStyle = rgb([0.6, 0.6, 0.6]);
-  for (let y = 0; y < height; y += 10) for (let x = y % 20; x < width; x += 20) context.fillRect(x, y, 10, 10);
+  context.fillStyle = rgb(gray(1));
+  const { side } = CHECKERS;
+  for (let y = 0; y < height; y += side) for (let x = y % (2 * side); x < width; x += 2 * side) context.fillRect(x, y, side, side);
 }
 
 /** @param {number[]} color */

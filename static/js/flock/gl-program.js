@@ -1,6 +1,7 @@
 // The WebGL 2 programs: for the background, for one sprite, and for two sprites that fade. One program for both
 // would sample every sprite twice in software renderers, which follow both sides of a branch.
 // @ts-check
+import { CHECKERS } from "./appearance.js";
 
 export const KINDS = { picture: 0, checkers: 1, color: 2 };
 
@@ -17,8 +18,8 @@ uniform vec3 color;
 in vec2 at;
 out vec4 shown;
 void main() {
-  ivec2 square = ivec2(gl_FragCoord.xy) / 10;
-  vec3 checkers = vec3(((square.x + square.y) & 1) == 0 ? 0.8 : 0.6);
+  ivec2 square = ivec2(gl_FragCoord.xy) / ${CHECKERS.side};
+  vec3 checkers = vec3(((square.x + square.y) & 1) == 0 ? ${CHECKERS.grays[0]} : ${CHECKERS.grays[1]});
   shown = vec4(kind == 0 ? texture(picture, at).rgb : kind == 1 ? checkers : color, 1);
 }`];
 

@@ -3,7 +3,7 @@
 import { element } from "../app/element.js";
 import { say, sayOr } from "../app/words.js";
 import { choiceOf, framed, nameOf } from "./control.js";
-import { CLEAR } from "./ways.js";
+import { broughtAlong } from "./implied.js";
 
 /** @typedef {import("./control.js").Control} Control @typedef {import("./control.js").Studio} Studio */
 
@@ -39,19 +39,11 @@ export function seed(field, studio) {
   return { node, name: "seed", update(value, { isSet }) { if (document.activeElement !== input) input.value = String(value ?? 1); setReset(isSet); } };
 }
 
-/** The format that a transparent background adds if the files have no other: video.mp4 has no transparency. */
-const ADDED = "webm";
-/** Returns whether the files are the usual ones with the one that the background adds. @param {Studio} studio @param {(name: string) => any} valueOf */
-const isImplied = ({ fields }, valueOf) => valueOf("render.background") === "transparent" && String(valueOf("render.formats")) === String([...fields.get("render.formats")?.default ?? [], ADDED]);
-
 /** Plate, transparent or a color. @param {import("./schema.js").Field} field @param {Studio} studio @param {(name: string) => any} valueOf @returns {Control} */
 export function background(field, studio, valueOf) {
   const color = element("input.color", { type: "color", value: "#103040", "aria-label": say("set.background.color.pick") });
   const choose = (/** @type {string} */ what) => {
-    const formats = valueOf("render.formats") ?? [];
-    const isBare = what === "transparent" && !formats.some((/** @type {string} */ one) => CLEAR.includes(one));
-    const more = isBare ? { "render.formats": [...formats, ADDED] } : what !== "transparent" && isImplied(studio, valueOf) ? { "render.formats": undefined } : {};
-    studio.change({ "render.background": what === "plate" ? undefined : what === "color" ? color.value : what, ...more });
+    studio.change({ "render.background": what === "plate" ? undefined : what === "color" ? color.value : what, ...broughtAlong(what, studio.fields, valueOf) });
   };
   const all = ["plate", "transparent", "color"].map((what) => radio("background", what, say(`set.background.${what}`), () => choose(what)));
   color.addEventListener("input", () => choose("color"));
@@ -89,8 +81,8 @@ export function size(field, studio, film) {
   };
 }
 
-/** Files besides video.mp4. @param {import("./schema.js").Field} field @param {Studio} studio @param {{formats: string[], valueOf: (name: string) => any}} known @returns {Control} */
-export function files(field, studio, { formats, valueOf }) {
+/** Files besides video.mp4. @param {import("./schema.js").Field} field @param {Studio} studio @param {string[]} formats @returns {Control} */
+export function files(field, studio, formats) {
   const all = formats.filter((one) => one !== "mp4").map((name) => {
     const input = element("input", { type: "checkbox", value: name, onchange: () => studio.change({ [field.name]: all.filter((one) => one.input.checked).map((one) => one.name) }) });
     return { name, input, node: element("label.check", {}, input, element("span", {}, choiceOf("format", name))) };
@@ -100,7 +92,7 @@ export function files(field, studio, { formats, valueOf }) {
     node, name: field.name,
     update(value, { isSet }) {
       for (const { name, input } of all) input.checked = Array.isArray(value) && value.includes(name);
-      setReset(isSet && !isImplied(studio, valueOf));
+      setReset(isSet);
     },
   };
 }

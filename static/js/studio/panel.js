@@ -4,6 +4,7 @@ import { element } from "../app/element.js";
 import { say } from "../app/words.js";
 import { control } from "./control.js";
 import { grouped, isIdle } from "./groups.js";
+import { isImplied } from "./implied.js";
 import { frameLimits, mostCount } from "./limits.js";
 import { background, files, presets, seed, size } from "./own-controls.js";
 
@@ -37,7 +38,7 @@ export function panel(studio) {
   const node = element("div.settings", {}, behaviors.node, ...plain(names.main), things, ...own("render.background", background, valueOf), ...plain(names.more),
     group("move", ...plain(names.move), group("fine", ...plain(names.fine)), group("zones", element("label.check", {}, useZones, element("span", {}, say("zones.use"))), zones), group("matching", ...plain(names.matching))),
     group("look", ...own("render.size_px", size, film.size), ...plain(names.look), element("p.soft", {}, say("set.look.note"))),
-    group("files", ...own("render.formats", files, studio), ...plain(names.files)));
+    group("files", ...own("render.formats", files, studio.formats), ...plain(names.files)));
 
   return {
     node, things,
@@ -47,7 +48,7 @@ export function panel(studio) {
       const params = { loop: valueOf("loop"), position: valueOf("position") };
       for (const { name, update } of controls) {
         const limits = name === "frames" ? frameLimits(params, n) : name === "count" ? [1, mostCount(valueOf("frames") ?? 1)] : undefined;
-        update(valueOf(name), { isSet: name in settings, limits, perUnit: name === "frames" ? film.fps : 1, isIdle: isIdle(name, valueOf) });
+        update(valueOf(name), { isSet: name in settings && !isImplied(name, fields, valueOf), limits, perUnit: name === "frames" ? film.fps : 1, isIdle: isIdle(name, valueOf) });
       }
       useZones.checked = valueOf("rules.zones") != null;
       zones.hidden = !useZones.checked;
