@@ -64,6 +64,7 @@ test("the film of a transparent flock is the one that is transparent, and its li
   assert.equal(filmFileOf(flock("transparent", [])), "video.mp4");
   assert.equal(filmFileOf(flock("plate", ["webm"])), "video.mp4");
   assert.deepEqual(sharedFilesOf(flock("transparent", ["webm"])), ["video.mp4", "flock.plan", "video.webm"]);
+  assert.deepEqual(sharedFilesOf(flock("transparent", ["mov", "webm"])), ["video.mp4", "flock.plan", "video.webm", "video.mov"]);
   assert.deepEqual(sharedFilesOf(flock("plate", ["webm"])), ["video.mp4", "flock.plan"]);
 });
 
@@ -113,15 +114,18 @@ test("a long line keeps its peaks, and an axis ends at a round number", () => {
 
 test("a shared link holds the signatures of its files, and nothing else is read from it", () => {
   const id = "01a21fc9-7d95-7277-b444-2600ce840b02";
-  const link = (name, query) => ({ name, url: `/v1/flocks/${id}/${name}?${query}` });
-  const links = [link("video.mp4", "expires=20&signature=ab"), link("flock.plan", "expires=19&signature=cd")];
+  const [ab, cd, ef] = ["ab", "cd", "ef"].map((pair) => pair.repeat(16));
+  const address = (name, expires, signature) => `/v1/flocks/${id}/${name}?expires=${expires}&signature=${signature}`;
+  const link = (name, ...of) => ({ name, url: address(name, ...of) });
+  const links = [link("video.mp4", 1796516109, ab), link("flock.plan", 1796516108, cd)];
   const path = pathOf(id, links);
-  assert.equal(path, `/s/${id}~20.ab~19.cd`);
-  assert.deepEqual(readLink(path.slice(3)), { files: [`/v1/flocks/${id}/video.mp4?expires=20&signature=ab`, `/v1/flocks/${id}/flock.plan?expires=19&signature=cd`], offered: null, expires_s: 19 });
-  const withClear = pathOf(id, [...links, link("video.webm", "expires=18&signature=ef")]);
-  assert.equal(withClear, `/s/${id}~20.ab~19.cd~webm.18.ef`);
-  assert.deepEqual([readLink(withClear.slice(3)).offered, readLink(withClear.slice(3)).expires_s], [`/v1/flocks/${id}/video.webm?expires=18&signature=ef`, 18]);
-  for (const text of ["", id, `${id}~20.ab`, `${id}~20.ab~19.cd~1.a`, `${id}~20.ab~19.cd~zip.1.a`, `../../x~20.ab~19.cd`, `${id}~20.ab~19.<b>`]) assert.equal(readLink(text), null);
+  const [base, video, plan] = path.slice(3).split("~");
+  assert.deepEqual([path.length, base.length, video.length, plan.length], [3 + 22 + 2 * 28, 22, 27, 27]);
+  const files = links.map(({ url }) => url);
+  assert.deepEqual(readLink(path.slice(3)), { files, offered: {}, expires_s: 1796516108 });
+  const both = pathOf(id, [...links, link("video.webm", 1796516110, ef), link("video.mov", 1796516107, ab)]).slice(3);
+  assert.deepEqual(readLink(both), { files, offered: { webm: address("video.webm", 1796516110, ef), mov: address("video.mov", 1796516107, ab) }, expires_s: 1796516107 });
+  for (const text of ["", base, `${base}~${video}`, `${base}~${video}~${plan}~${video}`, `${base}~${video}~${plan}~zip.${video}`, `${base}~${video}~${plan.slice(1)}`, `../../x~${video}~${plan}`, `${base}~${video}~<b>${plan.slice(3)}`]) assert.equal(readLink(text), null, text);
 });
 
 test("pieces of film end at jumps and where the mirror side changes, and tell the mean difference of heading", () => {

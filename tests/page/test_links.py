@@ -32,7 +32,7 @@ def test_one_click_copies_a_link_to_the_finished_film(visitor, filled_service):
     expect(friend).to_have_title(re.compile("^2 × goldfish .*, .* · flockreel$"))
     # The friend sees that the film is transparent.
     expect(friend.locator(".stage.is-clear video")).to_have_attribute("src", re.compile("video.webm"))
-    clear = friend.get_by_role("link", name=say(friend, "shared.save_clear"))
+    clear = friend.get_by_role("link", name=say(friend, "shared.save_clear", format="WebM"))
     assert fetch(filled_service + clear.get_attribute("href"))[:4] == b"\x1aE\xdf\xa3"
 
 

@@ -13,6 +13,9 @@ import { sharedTitle } from "../reel/shared-title.js";
 import { strips } from "../reel/strips.js";
 import { factsBox } from "../studio/facts.js";
 
+/** Names of the formats that keep transparency. @type {Record<string, string>} */
+const NAMES = { webm: "WebM", mov: "MOV" };
+
 /** @param {HTMLElement} root @param {import("../app/router.js").Visit} visit */
 export async function show(root, { id, query, life }) {
   root.classList.add("place-reel");
@@ -20,8 +23,10 @@ export async function show(root, { id, query, life }) {
   if (!link) return refuse(root, "shared.broken");
   if (link.expires_s * 1000 <= Date.now()) return refuse(root, "shared.over", { time: day(new Date(link.expires_s * 1000).toISOString()) });
   const [saved, planned] = link.files;
-  const isClear = link.offered?.includes("video.webm") ?? false;
-  const source = (isClear && link.offered) || saved;
+  const { webm } = link.offered;
+  const isClear = Boolean(webm);
+  const clear = Object.entries(link.offered);
+  const source = webm ?? saved;
   // Without the sign-in form: a friend has no token.
   const answer = await fetch(planned, { signal: life }).catch((error) => { throw error.name === "AbortError" ? error : unreachable(); });
   if (!answer.ok) return refuse(root, "shared.gone");
@@ -53,7 +58,7 @@ export async function show(root, { id, query, life }) {
   facts.update(plan);
   root.append(
     element("header.place-head", {}, element("div", {}, element("h1", { tabIndex: -1 }, name), element("p.soft", {}, [seconds(plan.nFrames / plan.fps), size.join(" × "), say("reel.link.until", { time: day(new Date(link.expires_s * 1000).toISOString()) })].join(" · "))),
-      element("p.actions", {}, link.offered && element("a.button", { href: link.offered, download: "" }, say("shared.save_clear")), element("a.button.quiet", { href: saved, download: "" }, say(link.offered ? "shared.save_opaque" : "shared.save")))),
+      element("p.actions", {}, ...clear.map(([word, href]) => element("a.button", { href, download: "" }, say("shared.save_clear", { format: NAMES[word] }))), element("a.button.quiet", { href: saved, download: "" }, say(clear.length ? "shared.save_opaque" : "shared.save")))),
     element("section.reel-view", { "aria-label": say("reel.watch") }, stage, element("div.stage-controls", {}, element("p.soft", {}, say("shared.what")), wholeScreen(stage, life)), time.node, figures?.node ?? ""),
     facts.node);
   return undefined;

@@ -44,17 +44,17 @@ export function filesOf(flock) {
   return ["video.mp4", ...wanted, ...(overlay ? ["overlay.mp4"] : []), ...(ground_truth ? ["tracks.csv", "ground-truth.zip"] : []), "flock.json", "flock.plan", "plan.svg"];
 }
 
-/** Returns the name of the transparent film of a transparent flock, if there is one. @param {Api.Flock} flock @returns {string | undefined} */
-const clearFileOf = (flock) => (flock.params.render?.background === "transparent" ? Object.values(OFFERED).find((name) => filesOf(flock).includes(name)) : undefined);
+/** Returns the names of the transparent films of a transparent flock. @param {Api.Flock} flock */
+const clearFilesOf = (flock) => (flock.params.render?.background === "transparent" ? Object.values(OFFERED).filter((name) => filesOf(flock).includes(name)) : []);
 
 /** Returns the name of the film that a person expects. @param {Api.Flock} flock */
-export const filmFileOf = (flock) => clearFileOf(flock) ?? "video.mp4";
+export const filmFileOf = (flock) => clearFilesOf(flock)[0] ?? "video.mp4";
 
 /** Returns the name of the film that a browser shows: a transparent one if it can. @param {Api.Flock} flock */
-export const shownFileOf = (flock) => (clearFileOf(flock) === OFFERED.webm ? OFFERED.webm : "video.mp4");
+export const shownFileOf = (flock) => (clearFilesOf(flock).includes(OFFERED.webm) ? OFFERED.webm : "video.mp4");
 
 /** Returns the names of the files that a link for friends opens. @param {Api.Flock} flock @returns {string[]} */
-export const sharedFilesOf = (flock) => [...SHARED, clearFileOf(flock) ?? ""].filter(Boolean);
+export const sharedFilesOf = (flock) => [...SHARED, ...clearFilesOf(flock)];
 
 /** Returns the name under which a file is saved, such as "goldfish_20x400_s1.mp4". @param {string} name @param {Api.Flock} flock @param {string} film */
 export function savedName(name, { count, frames, seed }, film) {

@@ -12,7 +12,7 @@ const MOST_CELLS = 20_000;
 export const orderKindOf = ({ milling, polarization }) => (milling > 0.6 ? "mill" : polarization > 0.8 ? "school" : polarization > 0.5 ? "loose" : "swarm");
 
 /** Returns the sentences about a plan. @param {import("../flock/plan.js").Plan} plan */
-function sentencesOf({ head: { stats }, nIndividuals: n, isPart, nFrames, fps }) {
+function sentencesOf({ head: { params, stats }, nIndividuals: n, isPart, nFrames, fps }) {
   const facts = [];
   const advice = [];
   const order = stats.polarization;
@@ -24,8 +24,9 @@ function sentencesOf({ head: { stats }, nIndividuals: n, isPart, nFrames, fps })
   if (apart && n > 1) facts.push(say("facts.apart", { n: count(apart) }));
   if (stats.clone_share >= 0.005 && n > 1) facts.push(say("facts.clones", { share: percent(stats.clone_share) }));
   const room = stats.room_for;
-  if (room && n > room) advice.push(say("advice.little_room", { n, room }));
-  else if (room) facts.push(say("facts.room", { n: room }));
+  const where = say(`facts.where.${params?.tank ?? "seen"}`);
+  if (room && n > room) advice.push(say("advice.little_room", { n, room, where }));
+  else if (room) facts.push(say("facts.room", { n: room, where }));
   if (stats.clone_share > CLONES && n > 1) advice.push(say("advice.clones", { n: stats.distinct_looks ?? n }));
   if (stats.wall_violations > 0) advice.push(say("advice.walls"));
   if (isPart) advice.push(say("advice.part", { time: count(nFrames / fps) }));

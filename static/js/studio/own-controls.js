@@ -4,6 +4,7 @@ import { element } from "../app/element.js";
 import { say, sayOr } from "../app/words.js";
 import { choiceOf, framed, nameOf } from "./control.js";
 import { broughtAlong } from "./implied.js";
+import { CLEAR } from "./ways.js";
 
 /** @typedef {import("./control.js").Control} Control @typedef {import("./control.js").Studio} Studio */
 
@@ -39,15 +40,31 @@ export function seed(field, studio) {
   return { node, name: "seed", update(value, { isSet }) { if (document.activeElement !== input) input.value = String(value ?? 1); setReset(isSet); } };
 }
 
-/** Plate, transparent or a color. @param {import("./schema.js").Field} field @param {Studio} studio @param {(name: string) => any} valueOf @returns {Control} */
-export function background(field, studio, valueOf) {
+/** Boxes for formats of files. @param {string[]} formats @param {(checked: string[]) => void} choose @param {string} label */
+function formatBoxes(formats, choose, label) {
+  const all = formats.map((name) => {
+    const input = element("input", { type: "checkbox", value: name, onchange: () => choose(all.filter((one) => one.input.checked).map((one) => one.name)) });
+    return { name, input, node: element("label.check", {}, input, element("span", {}, choiceOf("format", name))) };
+  });
+  const update = (/** @type {string[]} */ checked) => { for (const { name, input } of all) input.checked = checked.includes(name); };
+  return { node: element("div.checks", { role: "group", "aria-label": label }, ...all.map((one) => one.node)), update };
+}
+
+/** Plate, transparent or a color. @param {import("./schema.js").Field} field @param {Studio} studio @param {{formats: string[], valueOf: (name: string) => any}} known @returns {Control} */
+export function background(field, studio, { formats, valueOf }) {
   const color = element("input.color", { type: "color", value: "#103040", "aria-label": say("set.background.color.pick") });
   const choose = (/** @type {string} */ what) => {
     studio.change({ "render.background": what === "plate" ? undefined : what === "color" ? color.value : what, ...broughtAlong(what, studio.fields, valueOf) });
   };
   const all = ["plate", "transparent", "color"].map((what) => radio("background", what, say(`set.background.${what}`), () => choose(what)));
   color.addEventListener("input", () => choose("color"));
-  const note = element("p.soft", { hidden: true }, say("set.background.note"));
+  // The formats that keep transparency, as they are also among the files.
+  const kept = formatBoxes(formats.filter((one) => CLEAR.includes(one)), (checked) => {
+    const others = (valueOf("render.formats") ?? []).filter((/** @type {string} */ one) => !CLEAR.includes(one));
+    if (checked.length) studio.change({ "render.formats": [...others, ...checked] });
+    else kept.update(valueOf("render.formats"));
+  }, say("set.background.files"));
+  const note = element("div.background-files", { hidden: true }, kept.node, element("p.soft", {}, say("set.background.note")));
   const { node, setReset } = framed(field, studio, { input: null, below: element("div.chips", { role: "radiogroup", "aria-label": nameOf(field.name) }, ...all.map((one) => one.node), color) });
   node.append(note);
   return {
@@ -58,6 +75,7 @@ export function background(field, studio, valueOf) {
       if (isColor) color.value = value;
       color.hidden = !isColor;
       note.hidden = value !== "transparent";
+      kept.update(valueOf("render.formats") ?? []);
       setReset(isSet);
     },
   };
@@ -83,15 +101,12 @@ export function size(field, studio, film) {
 
 /** Files besides video.mp4. @param {import("./schema.js").Field} field @param {Studio} studio @param {string[]} formats @returns {Control} */
 export function files(field, studio, formats) {
-  const all = formats.filter((one) => one !== "mp4").map((name) => {
-    const input = element("input", { type: "checkbox", value: name, onchange: () => studio.change({ [field.name]: all.filter((one) => one.input.checked).map((one) => one.name) }) });
-    return { name, input, node: element("label.check", {}, input, element("span", {}, choiceOf("format", name))) };
-  });
-  const { node, setReset } = framed(field, studio, { input: null, below: element("div.checks", { role: "group", "aria-label": nameOf(field.name) }, ...all.map((one) => one.node)) });
+  const boxes = formatBoxes(formats.filter((one) => one !== "mp4"), (checked) => studio.change({ [field.name]: checked }), nameOf(field.name));
+  const { node, setReset } = framed(field, studio, { input: null, below: boxes.node });
   return {
     node, name: field.name,
     update(value, { isSet }) {
-      for (const { name, input } of all) input.checked = Array.isArray(value) && value.includes(name);
+      boxes.update(Array.isArray(value) ? value : []);
       setReset(isSet);
     },
   };

@@ -35,7 +35,7 @@ export function panel(studio) {
   const useZones = element("input", { type: "checkbox", onchange: () => studio.change({ "rules.zones": useZones.checked ? {} : null, ...Object.fromEntries(names.zones.map((name) => [name, undefined])) }, { step: "rules.zones" }) });
   const zones = element("div", {}, ...plain(names.zones));
   const things = element("div.things-list");
-  const node = element("div.settings", {}, behaviors.node, ...plain(names.main), things, ...own("render.background", background, valueOf), ...plain(names.more),
+  const node = element("div.settings", {}, behaviors.node, ...plain(names.main), things, ...own("render.background", background, studio), ...plain(names.more),
     group("move", ...plain(names.move), group("fine", ...plain(names.fine)), group("zones", element("label.check", {}, useZones, element("span", {}, say("zones.use"))), zones), group("matching", ...plain(names.matching))),
     group("look", ...own("render.size_px", size, film.size), ...plain(names.look), element("p.soft", {}, say("set.look.note"))),
     group("files", ...own("render.formats", files, studio.formats), ...plain(names.files)));
