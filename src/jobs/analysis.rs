@@ -26,10 +26,10 @@ use flockreel_core::progress::Progress;
 
 /// Stages with their share of the running time; measured.
 pub const STAGES: Stages = &[
-    ("background", 0.15),
-    ("tracking", 0.35),
-    ("distances", 0.15),
-    ("writing", 0.05),
+    ("background", 0.2),
+    ("tracking", 0.3),
+    ("distances", 0.05),
+    ("writing", 0.15),
     ("overlay", 0.3),
 ];
 

@@ -31,8 +31,8 @@ use flockreel_core::library::Library;
 pub const STAGES: Stages = &[
     ("loading", 0.05),
     ("simulating", 0.05),
-    ("planning", 0.3),
-    ("rendering", 0.6),
+    ("planning", 0.05),
+    ("rendering", 0.85),
 ];
 
 /// Area of a sprite for the estimate of the cost, pixels. Free choice.
