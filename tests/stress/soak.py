@@ -2,12 +2,13 @@
 
 In the first tenth of the time the service is killed every KILL_S seconds and started again. Then one process
 lives to the end, and its memory, threads, open files and write-ahead log are sampled. All of them must stay flat.
-At the end the queue must become empty and the invariants must hold.
+At the end the queue must become empty and the invariants must hold. The samples are kept in target/soak.csv.
 
     soak.py PROGRAM [--minutes 60] [--result FILE.json]
 """
 
 import argparse
+import csv
 import json
 import os
 import random
@@ -23,6 +24,7 @@ from pathlib import Path
 
 from scenario import Client, Service, make_film
 
+ROOT = Path(__file__).resolve().parents[2]
 KILL_S = 20
 SAMPLE_S = 5
 #: Part of the last process's life in which memory may still grow: caches fill, and the allocator finds its size.
@@ -40,12 +42,20 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         soak = Soak(options.program.resolve(), Path(folder), options.minutes * 60)
         rows = soak.run()
+    write_samples(ROOT / "target/soak.csv", soak.samples)
     faults = [name for name, _, _, is_met in rows if not is_met]
     for name, value, bar, is_met in rows:
         print(f"{'ok  ' if is_met else 'FAIL'} {name}: {value} (bar {bar})")
     if options.result:
         write_result(options.result, options.minutes, rows)
     return 1 if faults else 0
+
+
+def write_samples(path, samples):
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, samples[0].keys())
+        writer.writeheader()
+        writer.writerows(samples)
 
 
 class Soak:
