@@ -63,6 +63,8 @@ def measure(address, film, playwright):
     rows = [measured_to_swimming(page, address, footage)]
     library = get(f"{address}/v1/libraries")["items"][0]["id"]
     wait_for_job(address, post(f"{address}/v1/flocks", {"library_id": library, "count": 20, "frames": 200})["job_id"])
+    # The flock of this page would share the cores.
+    page.goto("about:blank")
     rows += home(browser, address)
     for count, frames, replan_ms, least_fps in ((20, 400, 150, 55), (200, 300, 350, 40)):
         page.goto(f"{address}/libraries/{library}/studio?count={count}&frames={frames}")
@@ -121,15 +123,15 @@ def home(browser, address):
 
 
 def studio(page, count, frames, replan_ms, least_fps):
-    fps = page.evaluate(FRAMES, COUNTED_S)
-    times = []
+    rates, times = [], []
     for k in range(N_RUNS):
+        rates.append(page.evaluate(FRAMES, COUNTED_S))
         times.append(page.evaluate(REPLAN, ['[data-name="count"] input[type=range]', count - 1 - k % 2]))
         page.wait_for_timeout(1000)
     size = f"{count} animals, {frames} frames"
     return [
         row(f"slider moved until the new flock is shown, {size}, ms", times, replan_ms),
-        row(f"pictures per second of the living flock, {size}", [fps], least_fps, at_least=True),
+        row(f"pictures per second of the living flock, {size}", rates, least_fps, at_least=True),
     ]
 
 
