@@ -6,6 +6,8 @@ import { listenForKeys } from "./keys.js";
 
 /** Frames of a step with Shift. */
 const FAR = 10;
+/** Time between two updates while frames follow one another, ms. Drawing the time line costs more than drawing a flock. */
+const SHOWN_MS = 100;
 /** Points of the strip. */
 const POINTS = 240;
 /** Rows of the strip's table. */
@@ -22,7 +24,7 @@ const ROWS = 12;
  * @returns {Timeline}
  */
 export function timeline({ life, seek, toggle, onScrub = () => {} }) {
-  let [frame, n_frames, fps] = [0, 1, 30];
+  let [frame, n_frames, fps, shown, timer] = [0, 1, 30, -1, 0];
   const play = element("button.quiet.play", { type: "button", onclick: toggle });
   const range = element("input", { type: "range", min: 0, step: 1, value: 0, "aria-label": say("timeline.slider") });
   const time = element("output.time");
@@ -36,6 +38,7 @@ export function timeline({ life, seek, toggle, onScrub = () => {} }) {
   const node = element("div.timeline", { role: "group", "aria-label": say("timeline.label") }, element("div.timeline-line", {}, play, range, time), chart);
 
   function show() {
+    shown = frame;
     range.value = String(frame);
     const text = say("timeline.now", { time: `${clock(frame / fps)}.${Math.floor((10 * frame) / fps) % 10}`, total: clock(n_frames / fps), frame: String(frame) });
     time.textContent = text;
@@ -43,6 +46,13 @@ export function timeline({ life, seek, toggle, onScrub = () => {} }) {
     const x = (POINTS * frame) / Math.max(1, n_frames - 1);
     now.setAttribute("x1", String(x));
     now.setAttribute("x2", String(x));
+  }
+
+  /** Shows the frame at once if none was shown lately, else soon. */
+  function showInTime() {
+    if (timer || shown === frame) return;
+    show();
+    timer = setTimeout(() => { timer = 0; showInTime(); }, SHOWN_MS);
   }
 
   /** @param {number} to */
@@ -53,6 +63,7 @@ export function timeline({ life, seek, toggle, onScrub = () => {} }) {
     onScrub(frame / fps);
   }
 
+  life.addEventListener("abort", () => clearTimeout(timer));
   range.addEventListener("input", () => scrub(Number(range.value)));
   strip.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
     const box = strip.getBoundingClientRect();
@@ -76,7 +87,7 @@ export function timeline({ life, seek, toggle, onScrub = () => {} }) {
 
   return {
     node, setPlaying,
-    setFrame(next) { frame = next; show(); },
+    setFrame(next) { frame = next; showInTime(); },
     setSpan(n, rate) { [n_frames, fps] = [n, rate]; range.max = String(n - 1); show(); },
     setSeries(series) {
       chart.hidden = !series;
