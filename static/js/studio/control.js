@@ -83,7 +83,7 @@ function slider(field, studio) {
   const range = element("input", { type: "range", "aria-label": title });
   const number = element("input.number", { type: "number", step: "any", inputMode: "decimal" });
   const { node, setReset } = framed(field, studio, { input: number, below: range });
-  // The slider's end grows with the value and never comes back, so that it does not move under a hand that drags.
+  // The largest value so far. The slider never ends below it, so that a person can drag back.
   let [limits, unit, shown, farthest] = [[field.min, field.max], 1, NaN, 0];
   const send = (/** @type {HTMLInputElement} */ input, /** @type {boolean} */ isFinal) => {
     const asked = Number.parseFloat(input.value) * unit;

@@ -3,7 +3,7 @@
 import { element } from "../app/element.js";
 import { say, sayOr } from "../app/words.js";
 import { choiceOf, framed, nameOf } from "./control.js";
-import { broughtAlong } from "./implied.js";
+import { impliedChanges } from "./implied.js";
 import { CLEAR } from "./ways.js";
 
 /** @typedef {import("./control.js").Control} Control @typedef {import("./control.js").Studio} Studio */
@@ -54,7 +54,7 @@ function formatBoxes(formats, choose, label) {
 export function background(field, studio, { formats, valueOf }) {
   const color = element("input.color", { type: "color", value: "#103040", "aria-label": say("set.background.color.pick") });
   const choose = (/** @type {string} */ what) => {
-    studio.change({ "render.background": what === "plate" ? undefined : what === "color" ? color.value : what, ...broughtAlong(what, studio.fields, valueOf) });
+    studio.change({ "render.background": what === "plate" ? undefined : what === "color" ? color.value : what, ...impliedChanges(what, studio.fields, valueOf) });
   };
   const all = ["plate", "transparent", "color"].map((what) => radio("background", what, say(`set.background.${what}`), () => choose(what)));
   color.addEventListener("input", () => choose("color"));
