@@ -1,14 +1,16 @@
-//! Reads the corpus of bad films under strace (docs/explanation/promises.md, "Bad input" and "Confined media
-//! tools"). Each film ends with an allowed code in time. The media tools open only their input and their
-//! libraries, start no processes and create no sockets. The sandbox is off, so only the tools' options count.
+//! Reads the corpus of bad films, and writes a film in each format, under strace (docs/explanation/promises.md, "Bad
+//! input" and "Confined media tools"). Each bad film ends with an allowed code in time. The media tools open only
+//! their input or output and their libraries, start no processes and create no sockets. The sandbox is off, so only
+//! the tools' options count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use flockreel::media::{Layers, Limits, Video};
+use flockreel::media::{Encoding, Layers, Limits, Quality, Video, VideoFormat, VideoWriter};
 use flockreel_core::code::Code;
+use flockreel_core::raster::{ColorSpec, Frame};
 
 use super::corpus::{Case, corpus};
 use super::read_all;
@@ -18,6 +20,17 @@ use crate::common::film::Films;
 const FOLDER: &str = "FLOCKREEL_TRACED_FOLDER";
 /// Time limit for one file.
 const LONGEST: Duration = Duration::from_secs(30);
+/// All formats of output.
+const ENCODINGS: [Encoding; 8] = [
+    Encoding::H264(Quality { crf: 18, threads: 4 }),
+    Encoding::Seekable,
+    Encoding::Gif,
+    Encoding::Vp9 { alpha: true },
+    Encoding::ProRes { alpha: true },
+    Encoding::Webp,
+    Encoding::StillWebp,
+    Encoding::Thumb(50),
+];
 
 #[test]
 fn bad_films_fail_with_their_code_and_open_no_other_file() {
@@ -57,7 +70,7 @@ fn read_the_folder() {
         layers: Layers::BASIC,
         ..Limits::default()
     };
-    for entry in std::fs::read_dir(folder).expect("the folder").flatten() {
+    for entry in std::fs::read_dir(&folder).expect("the folder").flatten() {
         let start = Instant::now();
         let end = Video::open(&entry.path(), &limits)
             .map_err(|error| error.code())
@@ -67,6 +80,31 @@ fn read_the_folder() {
         assert!(start.elapsed() < LONGEST, "{name} took too long");
         println!("end {name}: {end}");
     }
+    for (k, encoding) in ENCODINGS.into_iter().enumerate() {
+        write(&folder.join(format!("written {k}")), encoding, &limits);
+    }
+}
+
+/// Writes a film of two gray frames; a still picture has one.
+fn write(path: &Path, encoding: Encoding, limits: &Limits) {
+    let [width, height] = [64, 48];
+    let format = VideoFormat {
+        width,
+        height,
+        fps: 25.0,
+        color: ColorSpec::default(),
+    };
+    let mut writer = VideoWriter::create_with(path, &format, encoding, limits).expect("an encoder");
+    let is_still = matches!(encoding, Encoding::StillWebp | Encoding::Thumb(_));
+    for _ in 0..if is_still { 1 } else { 2 } {
+        let written = if encoding.takes_rgba() {
+            writer.write_rgba(&vec![128; (width * height * 4) as usize])
+        } else {
+            writer.write(&Frame::new(width, height, format.color))
+        };
+        written.expect("space in the pipe");
+    }
+    writer.finish().expect("a film");
 }
 
 /// Reads the folder in a second process. Returns its stdout, and its trace if strace is available.
@@ -131,19 +169,21 @@ fn strangers(trace: &str) -> Vec<String> {
         tools.n_started
     );
     assert!(
-        tools.n_inputs > 200,
+        tools.n_read > 200,
         "the trace shows too little: {} inputs",
-        tools.n_inputs
+        tools.n_read
     );
+    assert_eq!(tools.n_written, ENCODINGS.len(), "outputs in the trace");
     strangers.into_iter().collect()
 }
 
-/// The threads of media tools in the trace, each with the input file of its tool.
+/// The threads of media tools in the trace, each with the file that its tool may open.
 #[derive(Default)]
 struct Tools {
-    inputs: BTreeMap<u32, Option<String>>,
+    files: BTreeMap<u32, Option<String>>,
     n_started: usize,
-    n_inputs: usize,
+    n_read: usize,
+    n_written: usize,
 }
 
 impl Tools {
@@ -151,32 +191,33 @@ impl Tools {
     fn look(&mut self, thread: u32, call: &str) -> bool {
         let quoted: Vec<&str> = call.split('"').skip(1).step_by(2).collect();
         if call.starts_with("execve(") && quoted[0].ends_with(['g', 'e']) && is_tool(quoted[0]) {
-            let again = self.inputs.contains_key(&thread);
-            let input = quoted.iter().find_map(|word| word.strip_prefix("file:"));
-            self.inputs.insert(thread, input.map(str::to_owned));
+            let again = self.files.contains_key(&thread);
+            let file = quoted.iter().find_map(|word| word.strip_prefix("file:"));
+            self.files.insert(thread, file.map(str::to_owned));
             self.n_started += 1;
             return again;
         }
-        let Some(input) = self.inputs.get(&thread).cloned() else {
+        let Some(file) = self.files.get(&thread).cloned() else {
             return false;
         };
         if let Some((_, new)) = call.rsplit_once(" = ")
             && (call.contains("clone") || call.contains("fork"))
         {
             if let Ok(new) = new.parse() {
-                self.inputs.insert(new, input);
+                self.files.insert(new, file);
             }
             return !call.contains("CLONE_THREAD")
                 && call.starts_with(['c', 'f', 'v'])
                 && !call.contains("unfinished");
         }
         if call.starts_with("open") {
-            let is_input = quoted
-                .first()
-                .is_some_and(|path| input.as_deref() == Some(*path));
-            self.n_inputs += usize::from(is_input);
-            let is_own = quoted.first().is_some_and(|path| is_of_the_program(path));
-            return !is_input && !is_own && !call.contains(" = -1 ");
+            let path = quoted.first().copied();
+            let is_file = path.is_some() && file.as_deref() == path;
+            let writes = call.contains("O_CREAT");
+            self.n_written += usize::from(is_file && writes);
+            self.n_read += usize::from(is_file && !writes);
+            let is_own = !writes && path.is_some_and(is_of_the_program);
+            return !is_file && !is_own && !call.contains(" = -1 ");
         }
         call.starts_with("execve") || call.starts_with("socket") || call.starts_with("connect")
     }

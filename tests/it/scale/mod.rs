@@ -2,6 +2,7 @@
 //! `make scale-test` starts the servers and runs these tests.
 
 mod machines;
+mod space;
 mod stall;
 mod uploads;
 mod watched;
