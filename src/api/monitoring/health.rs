@@ -54,7 +54,7 @@ pub(super) struct LayerView {
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct DiskView {
     /// Free space, bytes; null if unknown.
-    room_bytes: Option<u64>,
+    free_bytes: Option<u64>,
     /// Space that uploads leave free, bytes.
     reserve_bytes: u64,
     /// Whether more than this reserve is free.
@@ -84,10 +84,10 @@ pub(in crate::api) async fn readyz(
     let blobs = store.blobs().clone();
     let (is_reached, is_local) = tokio::join!(blobs.is_reached(), blobs.is_writable());
     let free_bytes = tokio::task::spawn_blocking(move || blobs.free_bytes().ok());
-    let room_bytes = free_bytes.await.ok().flatten();
-    let has_more = |n_bytes| room_bytes.is_some_and(|free_bytes| free_bytes > n_bytes);
+    let free_bytes = free_bytes.await.ok().flatten();
+    let has_more = |n_bytes| free_bytes.is_some_and(|free_bytes| free_bytes > n_bytes);
     let disk = DiskView {
-        room_bytes,
+        free_bytes,
         reserve_bytes: state.config.disk_reserve_bytes,
         ok: has_more(state.config.disk_reserve_bytes),
     };

@@ -60,7 +60,7 @@ pub fn check(
     continuations.sort_unstable();
     let n_continued = if params.is_loop { n as u32 } else { 0 };
     if !continuations.into_iter().eq(0..n_continued) {
-        return refuse("wrong_heir", "continues_as must name each id once");
+        return refuse("wrong_continuation", "continues_as must name each id once");
     }
     let checker = Checker::new(library, flock);
     let mut n_jumps = 0;

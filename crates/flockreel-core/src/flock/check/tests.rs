@@ -262,10 +262,10 @@ fn loop_passes_and_wrong_continuations_are_refused() {
         "{code}"
     );
     spoiled.individuals[1].continues_as = continuations[1];
-    assert_eq!(violation_of(&library, &spoiled).code, "wrong_heir");
+    assert_eq!(violation_of(&library, &spoiled).code, "wrong_continuation");
     spoiled.individuals[1].continues_as = None;
-    assert_eq!(violation_of(&library, &spoiled).code, "wrong_heir");
+    assert_eq!(violation_of(&library, &spoiled).code, "wrong_continuation");
     let mut spoiled = flock;
     spoiled.params.is_loop = false;
-    assert_eq!(violation_of(&library, &spoiled).code, "wrong_heir");
+    assert_eq!(violation_of(&library, &spoiled).code, "wrong_continuation");
 }
