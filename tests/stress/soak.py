@@ -29,8 +29,13 @@ KILL_S = 20
 SAMPLE_S = 5
 #: Part of the last process's life in which memory may still grow: caches fill, and the allocator finds its size.
 WARM_UP = 1 / 6
-#: Highest slopes per hour, from first to last sample after the warm-up. The log of SQLite is emptied at 4 MB.
-BARS = {"memory_mb": 1.0, "threads": 1.0, "files": 2.0, "wal_mb": 1.0}
+#: Names and highest values of the growth in an hour after the warm-up. SQLite empties its log at 4 MB.
+GROWTHS = {
+    "memory_mb": ("growth of memory, MB per hour", 1.0),
+    "threads": ("growth of threads, per hour", 1.0),
+    "files": ("growth of open files, per hour", 2.0),
+    "wal_mb": ("growth of the write-ahead log, MB per hour", 1.0),
+}
 
 
 def main():
@@ -85,16 +90,17 @@ class Soak:
             n_stuck = self.n_unfinished()
         done = subprocess.run([self.program, "check", "--data", self.data], capture_output=True, text=True, check=False)
         drafts = list((self.data / "tmp").iterdir())
-        rows = [(f"{name} per hour", round(self.slope(name), 2), f"< {bar}", self.slope(name) < bar) for name, bar in BARS.items()]
+        growths = {key: self.slope(key) for key in GROWTHS}
+        rows = [(name, round(growths[key], 2), f"< {bar}", growths[key] < bar) for key, (name, bar) in GROWTHS.items()]
         return [
             ("stories of good clients", self.n_stories, "> 0", self.n_stories > 0),
             ("hostile requests", self.n_attacks, "> 0", self.n_attacks > 0),
             ("kills", n_kills, "> 0", n_kills > 0),
             *rows,
-            ("answers with 5xx, but for 503", self.n_server_errors, "0", self.n_server_errors == 0),
-            ("jobs that do not end", n_stuck, "0", n_stuck == 0),
-            ("drafts left behind", len(drafts), "0", not drafts),
-            ("faults of flockreel check", done.stderr.count("flockreel: I"), "0", done.returncode == 0),
+            ("answers with 5xx other than 503", self.n_server_errors, "0", self.n_server_errors == 0),
+            ("jobs that did not end", n_stuck, "0", n_stuck == 0),
+            ("temporary files left behind", len(drafts), "0", not drafts),
+            ("faults that flockreel check finds", done.stderr.count("flockreel: I"), "0", done.returncode == 0),
         ]
 
     def started(self):
