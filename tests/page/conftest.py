@@ -51,9 +51,10 @@ def other_film(tmp_path, small_film):
     return Path(shutil.copy(small_film, tmp_path / "minnow.mp4"))
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def filled_service(tmp_path_factory, film):
-    """Address of a service with one film and one flock of 6, made through the API."""
+    """Address of a service with one film and one flock of 6, made through the API. Each file of tests has its own,
+    because tests add to it."""
     with started(PROGRAM, tmp_path_factory.mktemp("filled") / "data") as address:
         fill(address, film)
         yield address

@@ -41,7 +41,7 @@ def gl_page(gl_browser):
     assert faults == []
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def fish(filled_service):
     """Address of the service, id of the library, and id of its virtual fish."""
     library = json.loads(fetch(f"{filled_service}/v1/libraries"))["items"][-1]["id"]

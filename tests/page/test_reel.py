@@ -20,7 +20,7 @@ pytestmark = pytest.mark.thorough
 UNDO_MS = 10_000
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def flock(filled_service):
     """The flock of the filled service."""
     return get(f"{filled_service}/v1/flocks")["items"][-1]
