@@ -106,8 +106,10 @@ arm-test: target/vendor ## run the library's tests on an emulated ARM processor,
 	CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc PROPTEST_CASES=8 \
 	$(CARGO) test --locked --workspace --lib --target $(ARM) --target-dir target/arm $(ARM_TESTS)
 
-docs: target/vendor ## build the documentation, with warnings as errors
+docs: target/vendor ## build the documentation, with warnings as errors, and compare the reference with the program
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --workspace --no-deps --document-private-items
+	$(CARGO) test --locked --workspace --no-run
+	python3 -B scripts/reference.py $(DEBUG) --check
 
 deny: ## check licences, bans and sources of the dependencies, offline; installs cargo-deny
 	@CARGO="$(CARGO)" scripts/cargo-deny.sh licences
