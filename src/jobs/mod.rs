@@ -84,7 +84,7 @@ pub struct Context {
     pub max_queued: i64,
     /// Ages at which data is deleted.
     pub retention: Retention,
-    /// Free disk space below which jobs are stopped, bytes. It keeps space for the database.
+    /// Free disk space below which no job begins and running jobs are stopped, bytes. It keeps space for the database.
     pub min_free_bytes: u64,
     /// Metrics of the jobs of this process.
     pub meters: Meters,
@@ -109,7 +109,8 @@ impl Context {
     }
 
     /// Queues a job, after `after_job` if that makes its input. Returns the id of the job and the id that its
-    /// result will have. Both are the next ids of `ids`, in this order.
+    /// result will have. Both are the next ids of `ids`, in this order. Fails with `storage_full` if the job could not
+    /// begin for lack of disk space.
     pub async fn enqueue<Input: JobInput>(
         &self,
         input: &Input,
@@ -117,6 +118,7 @@ impl Context {
         account: &Account,
         ids: &mut IdSequence,
     ) -> Result<(JobId, Input::ResultId), store::Error> {
+        self.require_disk_space()?;
         let (job_id, result_id) = (JobId(ids.next_id()), ids.next_id());
         let job = NewJob {
             job_id,
@@ -134,13 +136,22 @@ impl Context {
         Ok((job_id, result_id.into()))
     }
 
-    /// Returns a job that failed or was cancelled to the queue.
+    /// Fails with `storage_full` if only this machine runs jobs, and its disk has too little free space for them.
+    fn require_disk_space(&self) -> Result<(), store::Error> {
+        if self.store.is_alone() {
+            self.store.require_free(self.min_free_bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Returns a job that failed or was cancelled to the queue. Fails as [`Context::enqueue`] does.
     pub async fn retry(
         &self,
         job: JobId,
         owners: &OwnerFilter,
         account: &Account,
     ) -> Result<Retry, store::Error> {
+        self.require_disk_space()?;
         let (store, now_ms) = (&self.store, self.now_ms().await?);
         let retry = store
             .retry(job, owners, account, self.max_queued, now_ms)

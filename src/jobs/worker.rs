@@ -35,7 +35,7 @@ const BACKOFF_MS: i64 = 2_000;
 /// Outcome of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// No job was ready.
+    /// No job was ready, or the disk has too little free space for one.
     Idle,
     /// The job is done and its result is linked.
     Done(JobId),
@@ -68,8 +68,11 @@ impl Worker {
         Worker { context, lane }
     }
 
-    /// Claims the next job, runs it and ends it.
+    /// Claims the next job, runs it and ends it. While disk space is short, jobs stay in the queue.
     pub async fn step(&self) -> Result<Step, store::Error> {
+        if self.context.lacks_disk_space() {
+            return Ok(Step::Idle);
+        }
         let (process, now_ms) = (self.context.process, self.context.now_ms().await?);
         let store = &self.context.store;
         let claimed = store.claim_in(self.lane, process, now_ms, self.lease_ms());

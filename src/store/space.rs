@@ -131,8 +131,12 @@ impl Store {
 
     /// Fails with `storage_full` if `n_bytes` more would use the reserve of the disk.
     pub fn check_disk(&self, n_bytes: u64) -> Result<(), Error> {
-        let needed_bytes = n_bytes.saturating_add(self.space.limits.disk_reserve_bytes);
-        if needed_bytes > self.blobs.free_bytes()? {
+        self.require_free(n_bytes.saturating_add(self.space.limits.disk_reserve_bytes))
+    }
+
+    /// Fails with `storage_full` if the disk has less than `n_bytes` free.
+    pub fn require_free(&self, n_bytes: u64) -> Result<(), Error> {
+        if n_bytes > self.blobs.free_bytes()? {
             self.space.refusals.by_disk.fetch_add(1, Ordering::Relaxed);
             return Err(Error::Io(ErrorKind::StorageFull.into()));
         }

@@ -101,7 +101,8 @@ pub(in crate::api) async fn readyz(
         files: !is_local,
         media_tool: media_tool.is_none(),
         reserve: !disk.ok,
-        job_reserve: !has_more(context.min_free_bytes),
+        // If machines share the queue, others may run the jobs.
+        job_reserve: store.is_alone() && !has_more(context.min_free_bytes),
     };
     let ready = is_readable && is_reached && !context.draining.is_cancelled();
     let status = if ready {

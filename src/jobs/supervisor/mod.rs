@@ -64,7 +64,15 @@ impl Supervisor {
 }
 
 async fn work(worker: Worker, context: Context) {
+    let mut lacked_space = false;
     while !context.draining.is_cancelled() {
+        let lacks_space = context.lacks_disk_space();
+        if lacks_space && !lacked_space {
+            tracing::warn!(
+                "the free disk space is below the reserve: jobs wait until there is more"
+            );
+        }
+        lacked_space = lacks_space;
         // Created before the step, so that it also hears of a job that is queued during the step.
         let woken = context.wake.notified();
         match worker.step().await {

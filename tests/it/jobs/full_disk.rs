@@ -1,5 +1,5 @@
-//! Behavior on a full disk (docs/explanation/promises.md, "Full disk"). Uploads are refused with 507 and
-//! leave no files, and jobs fail with `storage_full`. Stored files can be read and deleted, and everything
+//! Behavior on a full disk (docs/explanation/promises.md, "Full disk"). Uploads and new jobs are refused with 507 and
+//! leave no files, and running jobs fail with `storage_full`. Stored files can be read and deleted, and everything
 //! works again as soon as there is space. FLOCKREEL_FULL_SECONDS sets how long the disk stays full in the test
 //! under load, ten times instead of four.
 
@@ -101,13 +101,12 @@ async fn full_disk_refuses_new_data_and_keeps_stored_data() {
     assert_eq!(code_of(refused, 507).await, "storage_full");
     assert_eq!(refused_work(&server).await, ["uploads"]);
 
-    // Fill below the reserve, as another program may do: a job fails.
+    // Fill below the reserve, as another program may do: jobs are refused too.
     disk.free();
-    disk.fill_but(1 << 20);
+    disk.fill_but(1 << 19);
+    assert_refused(&server, 1, swim["id"].as_str().unwrap()).await;
+    assert_eq!(refused_work(&server).await, ["uploads", "jobs"]);
     let wish = json!({"footage_id": swim["id"]});
-    let accepted = server.accept("/v1/analyses", wish.clone()).await;
-    let failed = server.ended(&accepted["job_id"]).await;
-    assert_eq!(failed["error"]["code"], "storage_full", "{failed}");
     let path_of = |footage: &Value| format!("/v1/footage/{}", footage["id"].as_str().unwrap());
     let film = server.get(&format!("{}/file", path_of(&swim))).await;
     assert!(film.bytes().await.unwrap() == SWIM.as_slice());

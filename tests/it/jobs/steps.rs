@@ -142,10 +142,26 @@ async fn job_over_its_time_limit_is_stopped_and_fails() {
 #[tokio::test(flavor = "multi_thread")]
 async fn job_is_stopped_before_it_fills_the_disk() {
     let (app, job) = with_job().await;
-    let mut context = with_script(&app.context, UNTIL_STOPPED);
-    context.min_free_bytes = u64::MAX;
+    let commands = format!("fallocate -l 512M \"$folder/large\"; {UNTIL_STOPPED}");
+    let mut context = with_script(&app.context, &commands);
+    let free_bytes = app.context.store.blobs().free_bytes().unwrap();
+    context.min_free_bytes = free_bytes - (128 << 20);
     let step = Worker::new(context).step().await;
     assert_eq!(step.unwrap(), Step::Failed(job, Code::StorageFull));
+    app.assert_sound().await;
+}
+
+#[tokio::test]
+async fn job_waits_while_disk_space_is_short() {
+    let (app, job) = with_job().await;
+    let mut context = with_script(&app.context, &library());
+    context.min_free_bytes = u64::MAX;
+    let step = Worker::new(context.clone()).step().await;
+    assert_eq!(step.unwrap(), Step::Idle);
+    assert_eq!(state_of(&app, job).await, (JobState::Queued, 0));
+    context.min_free_bytes = 0;
+    let step = Worker::new(context).step().await;
+    assert_eq!(step.unwrap(), Step::Done(job));
     app.assert_sound().await;
 }
 
