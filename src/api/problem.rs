@@ -103,13 +103,20 @@ impl From<Code> for Problem {
 
 impl From<store::Error> for Problem {
     fn from(error: store::Error) -> Problem {
+        if error.is_unreachable() {
+            tracing::warn!(%error, "request refused: the database does not answer");
+            return Problem::new(Code::Busy, "the database of the service does not answer");
+        }
         from_error(error.code(), &error)
     }
 }
 
 impl From<jobs::Error> for Problem {
     fn from(error: jobs::Error) -> Problem {
-        from_error(error.code(), &error)
+        match error {
+            jobs::Error::Store(error) => error.into(),
+            error => from_error(error.code(), &error),
+        }
     }
 }
 
@@ -237,5 +244,23 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::ScopeTooSmall | Code::CrossSite => StatusCode::FORBIDDEN,
         Code::Stopping | Code::QueueFull | Code::Busy => StatusCode::SERVICE_UNAVAILABLE,
         Code::CrashedWorker | Code::Internal => StatusCode::INTERNAL_SERVER_ERROR,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lost_database_is_no_internal_error() {
+        let lost = || store::Error::Sql(sqlx::Error::PoolTimedOut);
+        for problem in [Problem::from(lost()), jobs::Error::Store(lost()).into()] {
+            assert_eq!(problem.status(), StatusCode::SERVICE_UNAVAILABLE);
+        }
+        let broken = store::Error::Sql(sqlx::Error::RowNotFound);
+        assert_eq!(
+            Problem::from(broken).status(),
+            StatusCode::INTERNAL_SERVER_ERROR
+        );
     }
 }

@@ -13,6 +13,9 @@ const SQLITE_FULL: u32 = 13;
 /// SQLite's extended result code SQLITE_IOERR_SHMSIZE: the index of the write-ahead log cannot grow.
 const SQLITE_IOERR_SHMSIZE: u32 = 4874;
 
+/// Error codes of PostgreSQL while it starts or stops, or has too many connections.
+const BUSY_SERVER: [&str; 4] = ["57P01", "57P02", "57P03", "53300"];
+
 /// Reasons why an operation of the store failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -129,6 +132,11 @@ impl Error {
         }
     }
 
+    /// Returns whether the database server does not answer or accepts no connections at the moment.
+    pub fn is_unreachable(&self) -> bool {
+        matches!(self, Error::Sql(error) if is_cured_by_waiting(error))
+    }
+
     /// Returns the stable code.
     pub fn code(&self) -> Code {
         match self {
@@ -158,6 +166,18 @@ impl Error {
             | Error::DatabaseOnServer
             | Error::UnknownValue { .. } => Code::Internal,
         }
+    }
+}
+
+/// Returns whether a database server that starts, stops or has too many connections may cause the error.
+pub(in crate::store) fn is_cured_by_waiting(error: &sqlx::Error) -> bool {
+    match error {
+        sqlx::Error::Io(error) => !is_disk_full(error),
+        sqlx::Error::PoolTimedOut => true,
+        sqlx::Error::Database(error) => {
+            BUSY_SERVER.contains(&error.code().as_deref().unwrap_or_default())
+        }
+        _ => false,
     }
 }
 

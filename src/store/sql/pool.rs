@@ -21,6 +21,7 @@ use tokio::time::{sleep, timeout};
 
 use super::{query, query_scalar};
 use crate::store::Error;
+use crate::store::error::is_cured_by_waiting;
 use flockreel_core::code::Code;
 
 static SQLITE_MIGRATIONS: Migrator = sqlx::migrate!("migrations/sqlite");
@@ -30,13 +31,13 @@ const SQLITE_READERS: u32 = 4;
 /// Number of connections of one process. Many processes share the server's limit, which is usually 100.
 const POSTGRES_CONNECTIONS: u32 = 8;
 
+/// Longest wait for a connection. Free choice: a request then has an answer while the server is down.
+const MAX_CONNECTION_WAIT: Duration = Duration::from_secs(10);
 /// Longest wait at the start for a server that does not answer. Free choice; a server that recovers from a crash
 /// needs about as long.
 const MAX_SERVER_WAIT: Duration = Duration::from_secs(30);
 /// Interval between attempts to connect, and between log lines about the wait. Free choice.
 const SERVER_RETRY: Duration = Duration::from_secs(2);
-/// Error codes of PostgreSQL while it starts or stops, or has too many connections.
-const BUSY_SERVER: [&str; 4] = ["57P01", "57P02", "57P03", "53300"];
 /// Error code of PostgreSQL: the database does not exist.
 const NO_SUCH_DATABASE: &str = "3D000";
 /// Error code of PostgreSQL: the database exists already.
@@ -99,7 +100,9 @@ impl Pool {
     pub(in crate::store) async fn open_postgres(url: &str) -> Result<Pool, Error> {
         let options = PgConnectOptions::from_str(url)?.application_name("flockreel");
         wait_for_server(&options).await?;
-        let pool = PgPoolOptions::new().max_connections(POSTGRES_CONNECTIONS);
+        let pool = PgPoolOptions::new()
+            .max_connections(POSTGRES_CONNECTIONS)
+            .acquire_timeout(MAX_CONNECTION_WAIT);
         let pool = match pool.clone().connect_with(options.clone()).await {
             Err(sqlx::Error::Database(error))
                 if error.code().as_deref() == Some(NO_SUCH_DATABASE) =>
@@ -247,17 +250,6 @@ async fn wait_for_server(options: &PgConnectOptions) -> Result<(), Error> {
         }
     }
     Err(Error::Unreachable { place, cause })
-}
-
-/// Returns whether a server that is starting may cause the error.
-fn is_cured_by_waiting(error: &sqlx::Error) -> bool {
-    match error {
-        sqlx::Error::Io(_) => true,
-        sqlx::Error::Database(error) => {
-            BUSY_SERVER.contains(&error.code().as_deref().unwrap_or_default())
-        }
-        _ => false,
-    }
 }
 
 /// Creates the database. Succeeds also if another process has created it.
