@@ -97,11 +97,16 @@ impl From<fish::Error> for Error {
     }
 }
 
-/// A store that is in use, cannot be opened, or belongs to another database, is a usage error.
+/// A store that cannot be opened or belongs to another database is a usage error. One that is in use is not: it becomes
+/// free when the other process ends.
 impl From<store::Error> for Error {
     fn from(error: store::Error) -> Error {
         match error {
-            store::Error::InUse(_) | store::Error::ForeignFiles => Error::Usage(error.to_string()),
+            store::Error::ForeignFiles => Error::Usage(error.to_string()),
+            store::Error::InUse(folder) => Error::Io {
+                what: "the data folder is in use by another flockreel".to_owned(),
+                cause: std::io::Error::other(folder.display().to_string()),
+            },
             store::Error::Unusable { .. } if error.code() == Code::Internal => {
                 Error::Usage(error.to_string())
             }
@@ -127,5 +132,15 @@ mod tests {
         assert_eq!(of(Code::NotAVideo), 2);
         assert_eq!(of(Code::StorageFull), 1);
         assert_eq!(Error::Usage("no such file: x".into()).exit_code(), 2);
+    }
+
+    #[test]
+    fn a_data_folder_in_use_exits_with_1_because_a_later_start_may_succeed() {
+        let error = Error::from(store::Error::InUse("films".into()));
+        assert_eq!(error.exit_code(), 1);
+        assert_eq!(
+            error.to_string(),
+            "the data folder is in use by another flockreel: films"
+        );
     }
 }

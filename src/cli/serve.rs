@@ -92,7 +92,10 @@ async fn serve(config: Config) -> Result<(), Error> {
 
 /// Returns a listener and its address. Port 0 in `bind` selects a free port.
 pub(super) async fn listen(bind: SocketAddr) -> Result<(TcpListener, SocketAddr), Error> {
-    let cannot = |error| Error::Usage(format!("cannot listen: {error}: {bind}"));
+    let cannot = |cause| Error::Io {
+        what: format!("cannot listen on {bind}"),
+        cause,
+    };
     let listener = listen_on(bind).map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
     Ok((listener, address))
