@@ -75,7 +75,7 @@ impl Metrics {
         registry.register("flockreel_jobs", "Jobs, by kind and state", jobs.clone());
         registry.register_with_unit(
             "flockreel_queue_oldest",
-            "Waiting time of the oldest queued job",
+            "Longest time that a job which could run has waited",
             Unit::Seconds,
             oldest_queued.clone(),
         );
@@ -93,7 +93,7 @@ impl Metrics {
         );
         registry.register(
             "flockreel_space_refusals",
-            "Uploads and results refused for lack of space, by limit",
+            "Uploads, jobs and results refused for lack of space, by limit",
             refusals.clone(),
         );
         requests.register(&mut registry);
@@ -123,7 +123,7 @@ impl Metrics {
             let n_jobs = count.map(|(_, _, n_jobs)| n_jobs).sum();
             self.jobs.get_or_create(&labels).set(n_jobs);
         }
-        let waited_ms = census.oldest_queued_ms.map_or(0, |ms| now_ms - ms);
+        let waited_ms = census.waiting_since_ms.map_or(0, |ms| now_ms - ms);
         self.oldest_queued.set(waited_ms.max(0) / 1000);
         for &(noun, n_bytes) in &census.stored_bytes {
             self.stored.get_or_create(&Stored { noun }).set(n_bytes);

@@ -10,8 +10,9 @@ use crate::store::{Error, Store, sql};
 pub struct Census {
     /// Number of jobs by kind and state. Combinations without jobs are left out.
     pub jobs: Vec<(Kind, JobState, i64)>,
-    /// Creation time of the oldest queued job, milliseconds since 1970; `None` if no job is queued.
-    pub oldest_queued_ms: Option<i64>,
+    /// Earliest time since which a queued job could run, milliseconds since 1970; `None` if none could. A job that
+    /// needs the result of another could run since that one was done.
+    pub waiting_since_ms: Option<i64>,
     /// Size of the files by type of data, bytes. `uploads` counts unfinished uploads only.
     pub stored_bytes: Vec<(&'static str, i64)>,
     /// Announced size of all open uploads and of all bodies that are being received, bytes.
@@ -27,8 +28,10 @@ impl Store {
             Ok((Kind::try_from(kind)?, JobState::try_from(state)?, n_jobs))
         });
         let jobs = jobs.collect::<Result<_, Error>>()?;
-        let sql = "select min(created_ms) from jobs where state = 'queued'";
-        let oldest_queued_ms = sql::query_scalar(sql).fetch_one(&self.reader).await?;
+        let sql = "select min(case when a.finished_ms > j.run_at_ms then a.finished_ms else j.run_at_ms end) \
+                   from jobs j left join jobs a on a.id = j.after_job \
+                   where j.state = 'queued' and (j.after_job is null or a.state = 'done')";
+        let waiting_since_ms = sql::query_scalar(sql).fetch_one(&self.reader).await?;
         let sources = ResourceKind::ALL.map(|kind| (kind.plural(), "size_bytes", kind.plural()));
         let uploads = (
             "uploads",
@@ -46,7 +49,7 @@ impl Store {
         Ok(Census {
             announced_bytes: of_uploads + self.incoming_bytes().cast_signed(),
             jobs,
-            oldest_queued_ms,
+            waiting_since_ms,
             stored_bytes,
         })
     }

@@ -216,6 +216,23 @@ async fn requeued_job_waits_and_counts_the_attempt_and_its_end() {
 }
 
 #[tokio::test]
+async fn waiting_time_begins_when_a_job_could_run() {
+    let queue = Queue::open().await;
+    let since = async || queue.store.census().await.unwrap().waiting_since_ms;
+    let first = queue.enqueue(None).await;
+    queue.enqueue(Some(first)).await;
+    assert_eq!(since().await, Some(0));
+    let lease = queue.claim(0).await.unwrap();
+    assert_eq!(since().await, None, "the second waits for the first");
+    assert_eq!(queue.finish(&lease).await, Change::Made);
+    assert_eq!(since().await, Some(5));
+    let lease = queue.claim(5).await.unwrap();
+    let requeued = queue.store.requeue(&lease, End::Crash, 2_000).await;
+    assert_eq!(requeued.unwrap(), Change::Made);
+    assert_eq!(since().await, Some(2_000));
+}
+
+#[tokio::test]
 async fn released_job_does_not_count_the_attempt() {
     let queue = Queue::open().await;
     queue.enqueue(None).await;
