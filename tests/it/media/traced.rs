@@ -22,7 +22,10 @@ const FOLDER: &str = "FLOCKREEL_TRACED_FOLDER";
 const LONGEST: Duration = Duration::from_secs(30);
 /// All formats of output.
 const ENCODINGS: [Encoding; 8] = [
-    Encoding::H264(Quality { crf: 18, threads: 4 }),
+    Encoding::H264(Quality {
+        crf: 18,
+        threads: 4,
+    }),
     Encoding::Seekable,
     Encoding::Gif,
     Encoding::Vp9 { alpha: true },
