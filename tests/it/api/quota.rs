@@ -305,11 +305,18 @@ async fn service_below_the_reserve_of_the_disk_is_ready_for_everything_but_uploa
     assert_eq!(code_of(refused, 507).await, "storage_full");
     let ready = app.json("/readyz").await;
     let reason = "the free disk space is below the reserve";
-    let refused =
-        json!([{"work": "uploads", "reason": reason}, {"work": "jobs", "reason": reason}]);
+    // If machines share the queue, another may have space for the jobs.
+    let work = if app.context.store.is_alone() {
+        &["uploads", "jobs"][..]
+    } else {
+        &["uploads"]
+    };
+    let refused: Vec<_> = (work.iter())
+        .map(|work| json!({"work": work, "reason": reason}))
+        .collect();
     assert_eq!(
         (&ready["ready"], &ready["refused"], &ready["disk"]["ok"]),
-        (&json!(true), &refused, &json!(false))
+        (&json!(true), &json!(refused), &json!(false))
     );
     assert_eq!(app.json("/v1/footage").await["items"], json!([]));
     app.assert_sound().await;
