@@ -27,7 +27,7 @@ pub enum Error {
         /// Number of missing parts.
         n_missing: usize,
     },
-    /// A file or folder could not be read or written.
+    /// A file, a folder or an address could not be used.
     #[error("{what}: {cause}")]
     Io {
         /// Operation that failed, with the path.
