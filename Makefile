@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy unit scale-test race guards truth-test page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service hostile transitions page-bench screenshots ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy test-packages programs unit scale-test race guards truth-test page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service hostile transitions page-bench screenshots count ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -16,7 +16,12 @@ help: ## list the commands
 run: build ## install missing packages, build, and start the service with its page
 	$(RELEASE) serve --bind $(BIND) --data $(DATA)
 
-test: unit scale-test truth-test page-test contract-test stress-test ## install the packages that tests need, and run all tests
+# Two targets run at once, because many tests wait. Each prints its output when it ends.
+PAIRS = $(MAKE) --no-print-directory --jobs 2 --output-sync=target
+
+TESTS = page-test unit scale-test contract-test stress-test truth-test
+test: test-packages ## install the packages that tests need, and run all tests
+	@$(PAIRS) $(TESTS)
 	@echo "all tests passed"
 
 demo: build ## film -> library -> flock.mp4, without a server
@@ -26,7 +31,11 @@ demo: build ## film -> library -> flock.mp4, without a server
 	$(RELEASE) flock target/demo/library -o flock.mp4 --count 20 --frames 400
 	@echo "the flock is in flock.mp4"
 
-check: fmt clippy unit scale-test truth-test page-types page-test contract-test stress-test docs deny ## run all checks of CI
+# One compilation gives programs and lints: clippy-driver compiles as rustc does.
+check: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
+check: export CLIPPY_ARGS = -D__CLIPPY_HACKERY__warnings
+check: fmt test-packages ## run all checks of CI
+	@$(PAIRS) $(TESTS) page-types docs deny
 	@echo "all checks passed"
 
 fmt: ## check the formatting
@@ -35,15 +44,22 @@ fmt: ## check the formatting
 clippy: target/vendor ## run the lints, with warnings as errors
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 
-unit: target/vendor ## run the Rust tests
+test-packages: # at once, because the package manager runs only once at a time
+	@scripts/system-packages.sh vendor run test scale-test truth-test page-test contract-test
+
+# Programs and tests. `cargo build` would build the dependencies again, because it selects fewer features.
+TIMED = @scripts/timed.sh $@
+programs: vendor
+	$(TIMED) $(CARGO) test --locked --workspace --all-targets --no-run
+
+unit: programs ## run the Rust tests: make unit [TESTS_OF="-E 'test(boids)'"]
 	@scripts/system-packages.sh test
-	$(CARGO) test --locked --workspace
+	$(TIMED) scripts/nextest.sh $(TESTS_OF)
 
 # Tests of store, queue and API on PostgreSQL and a bucket, and tests that need several machines.
-SCALE_TESTS = $(CARGO) test --locked --lib store:: && $(CARGO) test --locked --lib -- --ignored store:: && \
-	$(CARGO) test --locked --test it -- jobs:: api:: && $(CARGO) test --locked --test it -- --ignored scale::
-scale-test: target/vendor ## test the service on PostgreSQL and an S3 store, with workers that are killed
-	@scripts/with-servers.sh sh -c '$(SCALE_TESTS)'
+scale-test: programs ## test the service on PostgreSQL and an S3 store, with workers that are killed
+	@scripts/system-packages.sh test
+	$(TIMED) scripts/with-servers.sh scripts/nextest.sh --profile scale --run-ignored all
 
 guards: target/vendor ## disable each protection of a promise once: its test must fail
 	@scripts/system-packages.sh test contract-test
@@ -55,32 +71,24 @@ race: target/vendor ## let eight processes race for 2000 jobs, on SQLite and on 
 	FLOCKREEL_RACE_JOBS=2000 $(CARGO) test --locked --test it -- --nocapture jobs::races
 	FLOCKREEL_RACE_JOBS=2000 scripts/with-servers.sh $(CARGO) test --locked --test it -- --nocapture jobs::races
 
-# These targets use the program that the tests built. `cargo build` would build the dependencies again,
-# because it selects fewer features.
-truth-test: target/vendor ## read the ground truth of a flock with pycocotools and TrackEval
-	$(CARGO) test --locked --workspace --no-run
-	@scripts/python-tests.sh truth $(DEBUG)
+truth-test: programs ## read the ground truth of a flock with pycocotools and TrackEval
+	$(TIMED) scripts/python-tests.sh truth $(DEBUG)
 
-page-types: vendor ## check the types of the page's modules against the OpenAPI document
-	@scripts/system-packages.sh vendor run
-	$(CARGO) test --locked --workspace --no-run
-	@python3 -B scripts/page-types.py $(DEBUG)
+page-types: programs ## check the types of the page's modules against the OpenAPI document
+	$(TIMED) python3 -B scripts/page-types.py $(DEBUG)
 
-page-test: vendor ## test the page in a browser, against a running service
-	$(CARGO) test --locked --workspace --no-run
-	@scripts/python-tests.sh page $(DEBUG)
+page-test: programs ## test the page in a browser, against a running service
+	$(TIMED) scripts/python-tests.sh page $(DEBUG)
 
-contract-test: target/vendor ## test the API against its OpenAPI document, with schemathesis
-	$(CARGO) test --locked --workspace --no-run
-	@scripts/python-tests.sh contract $(DEBUG)
+contract-test: programs ## test the API against its OpenAPI document, with schemathesis
+	$(TIMED) scripts/python-tests.sh contract $(DEBUG)
 
-stress-test: target/vendor ## lose the power, let steps fail, send too much: make stress-test [CASES=400]
-	$(CARGO) test --locked --workspace --no-run
+stress-test: programs ## lose the power, let steps fail, send too much: make stress-test [CASES=400]
 	@scripts/system-packages.sh test contract-test
-	python3 -B tests/stress/power_loss.py $(DEBUG)
-	python3 -B tests/stress/time_jumps.py $(DEBUG)
-	python3 -B tests/stress/overload.py $(DEBUG)
-	python3 -B tests/stress/failure_steps.py $(DEBUG) $(if $(filter all,$(CASES)),,--cases $(or $(CASES),16))
+	$(TIMED) python3 -B tests/stress/power_loss.py $(DEBUG)
+	$(TIMED) python3 -B tests/stress/time_jumps.py $(DEBUG)
+	$(TIMED) python3 -B tests/stress/overload.py $(DEBUG)
+	$(TIMED) python3 -B tests/stress/failure_steps.py $(DEBUG) $(if $(filter all,$(CASES)),,--cases $(or $(CASES),16))
 
 MINUTES ?= 60
 soak: build target/bench-venv/ready ## run the service with good and hostile clients for an hour: make soak [MINUTES=60]
@@ -106,13 +114,12 @@ arm-test: target/vendor ## run the library's tests on an emulated ARM processor,
 	CC_aarch64_unknown_linux_gnu=aarch64-linux-gnu-gcc PROPTEST_CASES=8 \
 	$(CARGO) test --locked --workspace --lib --target $(ARM) --target-dir target/arm $(ARM_TESTS)
 
-docs: target/vendor ## build the documentation, with warnings as errors, and compare the reference with the program
-	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --workspace --no-deps --document-private-items
-	$(CARGO) test --locked --workspace --no-run
-	python3 -B scripts/reference.py $(DEBUG) --check
+docs: programs ## test the examples of the documentation, build it with warnings as errors, and compare the reference with the program
+	$(TIMED) env RUSTDOC=scripts/rustdoc.sh $(CARGO) test --locked --workspace --doc
+	$(TIMED) python3 -B scripts/reference.py $(DEBUG) --check
 
-deny: ## check licences, bans and sources of the dependencies, offline; installs cargo-deny
-	@CARGO="$(CARGO)" scripts/cargo-deny.sh licences
+deny: ## check licences, bans and sources of the dependencies, offline
+	$(TIMED) scripts/cargo-deny.sh licences
 
 # Exit status 3: the check cannot be had here, as its script has said.
 supply: deny target/vendor ## also look for known weaknesses, list dependencies in target/sbom.json, run unsafe code under Miri
@@ -174,6 +181,10 @@ screenshots: vendor build ## make pictures of every place of the page and a reco
 	@scripts/system-packages.sh page-test screenshots
 	@scripts/venv.sh target/page-venv tests/page/requirements.txt
 	target/page-venv/bin/python -B scripts/screenshots.py $(RELEASE) target/screenshots
+
+count: ## count lines, constants and imports by module: make count [WRITE=1]
+	@$(if $(WRITE),$(MAKE) --no-print-directory target/bench-venv/ready)
+	@$(if $(WRITE),$(BENCH),python3) -B bench/count.py $(if $(WRITE),--write)
 
 ablation: target/vendor target/bench-venv/ready ## switch off each rule of the measurement once: make ablation GENERATOR=goldfish.py [FOOTAGE=folder]
 	$(BENCH) bench/ablation.py $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use crate::common::TestApp;
 use crate::common::app::{code_of, json_of};
-use crate::common::clip::SWIM;
+use crate::common::clip::{SWIM, SWIM_FRAMES};
 
 /// Starts a service with a library of the swimming fish. Returns the library's path and id.
 async fn with_library() -> (TestApp, String, String) {
@@ -123,8 +123,8 @@ async fn distance_array_matches_the_transitions_and_is_cacheable() {
     let bytes = answer.bytes().await.unwrap();
     assert_eq!(length, bytes.len().to_string().as_str());
     let stored = app.json(&format!("{library}/library.json")).await;
-    // 300 frames have 301 - f clips, where f is the number of frames of a clip.
-    let n = 301 - stored["params"]["clip_frames"].as_u64().unwrap_or(8) as usize;
+    // n frames have n + 1 - f clips, where f is the number of frames of a clip.
+    let n = SWIM_FRAMES + 1 - stored["params"]["clip_frames"].as_u64().unwrap_or(8) as usize;
     let header = String::from_utf8_lossy(&bytes[..128]).into_owned();
     assert!(header.contains(&format!("'shape': ({n}, {n})")), "{header}");
     assert_eq!(bytes.len(), 128 + 4 * n * n);

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::common::TestApp;
 use crate::common::app::json_of;
-use crate::common::clip::{SWIM, TINY};
+use crate::common::clip::{SWIM, SWIM_FRAMES, TINY};
 
 #[tokio::test]
 async fn wait_ends_after_the_requested_time() {
@@ -48,7 +48,7 @@ async fn job_that_ends_in_time_gives_201_with_its_result() {
         location,
         format!("/v1/libraries/{}", made["library_id"].as_str().unwrap())
     );
-    assert_eq!(app.json(&location).await["n_frames"], 300);
+    assert_eq!(app.json(&location).await["n_frames"], SWIM_FRAMES);
     workers.drain().await;
     app.assert_sound().await;
 }

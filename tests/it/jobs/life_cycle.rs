@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::common::TestApp;
 use crate::common::app::code_of;
-use crate::common::clip::{SWIM, TINY};
+use crate::common::clip::{SWIM, SWIM_FRAMES, TINY};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
@@ -24,13 +24,13 @@ async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
     assert_eq!(job["state"], "done", "{job}");
     let library = format!("/v1/libraries/{}", analysis["library_id"].as_str().unwrap());
     let at_a_glance = app.json(&library).await;
-    assert_eq!(at_a_glance["n_frames"], 300);
+    assert_eq!(at_a_glance["n_frames"], SWIM_FRAMES);
     assert!(
         at_a_glance["detected_share"].as_f64().unwrap() > 0.9,
         "{at_a_glance}"
     );
     let poses = app.json(&format!("{library}/poses.json")).await;
-    assert_eq!(poses["frames"].as_array().unwrap().len(), 300);
+    assert_eq!(poses["frames"].as_array().unwrap().len(), SWIM_FRAMES);
     for (file, magic) in [
         ("background.png", &b"\x89PNG"[..]),
         ("distance.png", b"\x89PNG"),
@@ -134,7 +134,7 @@ async fn assert_fish(app: &TestApp, library_id: &Value) {
     let at_a_glance = app.json(&fish).await;
     assert_eq!(
         (&at_a_glance["frames"], &at_a_glance["params"]["palette"]),
-        (&json!(300), &json!("silver"))
+        (&json!(SWIM_FRAMES), &json!("silver"))
     );
     for (file, at, magic) in [("video.mp4", 4, &b"ftyp"[..]), ("model.glb", 0, b"glTF")] {
         let answer = app.get(&format!("{fish}/{file}")).send().await.unwrap();

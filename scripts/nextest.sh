@@ -1,0 +1,13 @@
+#!/bin/sh
+# Runs the Rust tests with cargo-nextest of scripts/tools.txt, and prints the slowest.
+#
+#   scripts/nextest.sh [ARGUMENT...]     arguments of `cargo nextest run`, such as -E 'test(boids)'
+set -eu
+cd "$(dirname "$0")/.."
+scripts/venv.sh target/tools-venv scripts/tools.txt
+profile=default
+case " $* " in *" --profile scale "*) profile=scale ;; esac
+end=0
+PATH=$PWD/target/tools-venv/bin:$PATH cargo nextest run --locked --workspace "$@" || end=$?
+python3 -B scripts/slowest.py "target/nextest/$profile/junit.xml"
+exit $end
