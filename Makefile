@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy test-packages programs unit scale-test race guards truth-test page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service hostile transitions page-bench screenshots count ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy programs unit scale-test race guards truth-test page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service hostile transitions page-bench screenshots count ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -16,12 +16,8 @@ help: ## list the commands
 run: build ## install missing packages, build, and start the service with its page
 	$(RELEASE) serve --bind $(BIND) --data $(DATA)
 
-# Two targets run at once, because many tests wait. Each prints its output when it ends.
-PAIRS = $(MAKE) --no-print-directory --jobs 2 --output-sync=target
-
-TESTS = page-test unit scale-test contract-test stress-test truth-test
-test: test-packages ## install the packages that tests need, and run all tests
-	@$(PAIRS) $(TESTS)
+TESTS = unit scale-test page-test contract-test stress-test truth-test
+test: $(TESTS) ## install the packages that tests need, and run all tests
 	@echo "all tests passed"
 
 demo: build ## film -> library -> flock.mp4, without a server
@@ -34,8 +30,7 @@ demo: build ## film -> library -> flock.mp4, without a server
 # One compilation gives programs and lints: clippy-driver compiles as rustc does.
 check: export RUSTC_WORKSPACE_WRAPPER = clippy-driver
 check: export CLIPPY_ARGS = -D__CLIPPY_HACKERY__warnings
-check: fmt test-packages ## run all checks of CI
-	@$(PAIRS) $(TESTS) page-types docs deny
+check: deny fmt programs docs page-types $(TESTS) ## run all checks of CI
 	@echo "all checks passed"
 
 fmt: ## check the formatting
@@ -44,12 +39,10 @@ fmt: ## check the formatting
 clippy: target/vendor ## run the lints, with warnings as errors
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 
-test-packages: # at once, because the package manager runs only once at a time
-	@scripts/system-packages.sh vendor run test scale-test truth-test page-test contract-test
-
 # Programs and tests. `cargo build` would build the dependencies again, because it selects fewer features.
 TIMED = @scripts/timed.sh $@
 programs: vendor
+	@scripts/system-packages.sh build run
 	$(TIMED) $(CARGO) test --locked --workspace --all-targets --no-run
 
 unit: programs ## run the Rust tests: make unit [TESTS_OF="-E 'test(boids)'"]

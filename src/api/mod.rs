@@ -141,6 +141,13 @@ impl AppState {
             media_tool: tool.map_err(|error| error.to_string()),
         })))
     }
+
+    /// Changes the context. Panics if the state was cloned.
+    pub fn with_context(mut self, change: impl FnOnce(&mut Context)) -> AppState {
+        let shared = Arc::get_mut(&mut self.0);
+        change(&mut shared.expect("a state without clones").context);
+        self
+    }
 }
 
 /// Returns the router of the whole service. The program and the tests use the same one.

@@ -1,17 +1,23 @@
 //! Admission: received files become a footage, or are refused with a stable code and leave nothing behind
 //! (docs/explanation/promises.md, "Bad input" and "No upload is lost"). Every upload takes this path.
 
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
+
 use uuid::Uuid;
 
+use super::attempt::Film;
 use super::clock::now_ms;
 use super::masks::Masks;
-use super::{Context, Error, overlay};
+use super::{Context, Error, attempt, overlay};
 use crate::media::{Limits, ReadOptions, Video, read_image};
 use crate::store::footage::{Added, BACKGROUND, Footage, MASKS, POSTER, VIDEO};
 use crate::store::owners::Owner;
 use crate::store::space::Counted;
 use crate::store::{BlobFile, Draft, Store};
-use flockreel_core::footage::{FootageFormat, FrameSource};
+use flockreel_core::analysis;
+use flockreel_core::footage::FrameSource;
 
 /// Files received into a draft, synced and hashed, with their label and owner.
 pub struct ReceivedFiles {
@@ -35,12 +41,12 @@ pub struct ReceivedFiles {
 /// files. Waits for a permit of `upload_checks`; fails with [`Error::Busy`] if none becomes free.
 pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, Error> {
     let permit = context.upload_checks.acquire(&received.owner).await?;
+    let format = attempt::inspect(context, &received.draft).await?;
+    drop(permit);
     let store = context.store.clone();
-    let (received, format, poster) = tokio::task::spawn_blocking(move || {
-        let _permit = permit;
-        let video = inspect(&received)?;
-        let poster = poster(&store, &video, &received.draft);
-        Ok::<_, Error>((received, video.format(), poster))
+    let (received, poster) = tokio::task::spawn_blocking(move || {
+        let poster = sealed_poster(&store, &received.draft)?;
+        Ok::<_, Error>((received, poster))
     })
     .await
     .unwrap_or(Err(Error::Panicked))?;
@@ -56,48 +62,51 @@ pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, 
     Ok(added.await?)
 }
 
-/// Checks the files without decoding the video. Returns the video.
-fn inspect(received: &ReceivedFiles) -> Result<Video, Error> {
+/// Checks the files in a folder without decoding the whole video, and writes its poster. Returns the format of the
+/// video. It parses foreign files, so it runs in a child process.
+pub(super) fn inspect(folder: &Path) -> Result<Film, Error> {
     let limits = Limits::default();
-    let path = received.draft.path().join(VIDEO);
+    let path = folder.join(VIDEO);
     let video = Video::open(&path, &limits)?;
     let format = video.format();
-    if received.masks.is_some() {
-        let given = received.draft.path().join(MASKS);
-        let masks = Masks::open(
-            &video,
-            &path,
-            Some(&given),
-            &limits,
-            &ReadOptions::default(),
-        )?;
-        if let Some(masks) = masks {
+    let masks = folder.join(MASKS);
+    if masks.exists() {
+        let options = ReadOptions::default();
+        if let Some(masks) = Masks::open(&video, &path, Some(&masks), &limits, &options)? {
             masks.over(&video)?;
         }
     }
-    if received.background.is_some() {
-        let image = read_image(&received.draft.path().join(BACKGROUND), &limits)?;
+    let background = folder.join(BACKGROUND);
+    if background.exists() {
+        let image = read_image(&background, &limits)?;
         let (found, wanted) = ([image.width, image.height], [format.width, format.height]);
         if found != wanted {
-            return Err(
-                flockreel_core::analysis::Error::BackgroundSizeDiffers { found, wanted }.into(),
-            );
+            return Err(analysis::Error::BackgroundSizeDiffers { found, wanted }.into());
         }
     }
-    Ok(video)
+    // Footage that cannot be decoded has no poster: the analysis tells the reason.
+    if let Err(error) = overlay::write_poster(&video, folder) {
+        tracing::info!(%error, "a footage has no poster");
+        fs::remove_file(folder.join(POSTER)).ok();
+    }
+    Ok(Film {
+        width: format.width,
+        height: format.height,
+        fps: format.fps,
+        n_frames: format.n_frames_hint,
+    })
 }
 
-/// Writes the poster into the draft. Footage that cannot be decoded has none: the analysis tells the reason.
-fn poster(store: &Store, video: &Video, draft: &Draft) -> Option<BlobFile> {
-    let written = overlay::write_poster(video, draft.path())
-        .and_then(|()| Ok(store.blobs().seal_one(draft, POSTER)?));
-    written
-        .inspect_err(|error| tracing::info!(%error, "a footage has no poster"))
-        .ok()
+/// Syncs the poster in the draft, if there is one.
+fn sealed_poster(store: &Store, draft: &Draft) -> Result<Option<BlobFile>, Error> {
+    match store.blobs().seal_one(draft, POSTER) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        sealed => Ok(Some(sealed?)),
+    }
 }
 
 /// Returns the row of the footage, without the size of its files.
-fn footage_row(received: &ReceivedFiles, format: &FootageFormat) -> Footage {
+fn footage_row(received: &ReceivedFiles, format: &Film) -> Footage {
     let background = received.background.as_ref();
     let sha256 = |file: Option<&BlobFile>| file.map_or(Vec::new(), |file| file.sha256.clone());
     let masks = received.masks.as_ref();
@@ -114,7 +123,7 @@ fn footage_row(received: &ReceivedFiles, format: &FootageFormat) -> Footage {
         width: i64::from(format.width),
         height: i64::from(format.height),
         fps: format.fps,
-        n_frames_hint: i64::try_from(format.n_frames_hint).unwrap_or(i64::MAX),
+        n_frames_hint: i64::try_from(format.n_frames).unwrap_or(i64::MAX),
         sample: false,
         pinned: false,
         used_ms: now_ms,
@@ -140,7 +149,7 @@ mod tests {
             sha256: Vec::new(),
         };
         let mut context = Context::new(store, 1);
-        context.upload_checks = ConcurrencyLimit::new(0, Duration::from_millis(20));
+        context.upload_checks = ConcurrencyLimit::new(0, 1, Duration::from_millis(20));
         let received = ReceivedFiles {
             draft,
             video,

@@ -78,6 +78,8 @@ pub struct Context {
     pub lease: Duration,
     /// Time limit of one attempt at a job.
     pub budget: Duration,
+    /// Time limit of a check of received files.
+    pub check_time: Duration,
     /// Interval of the sweeps of expired data.
     pub sweep_every: Duration,
     /// Maximum number of queued and running jobs of all owners.
@@ -182,6 +184,7 @@ impl Context {
             memory_bytes: JobSettings::JOB_MEMORY_BYTES,
             lease: Duration::from_secs(15),
             budget: Duration::from_secs(JobSettings::JOB_TIME_S),
+            check_time: attempt::CHECK_TIME,
             sweep_every: Duration::from_secs(3600),
             max_queued: i64::MAX,
             retention: Retention::default(),

@@ -1,9 +1,9 @@
-//! Limits of space (docs/explanation/promises.md, "Limited space"): the bytes of each owner, and the bytes that uploads
-//! still bring against the free disk.
+//! Limits of space (docs/explanation/promises.md, "Limited space"): the bytes of each owner, and the free disk.
 //!
-//! An upload counts with its announced size from its beginning: a resumable one by its row, and the body of a request by
-//! an [`Announced`] in memory. The transaction that stores files checks the limit of their owner again, with the true
-//! size.
+//! Against the limit of its owner, an upload counts with its announced size from its beginning: a resumable one by its
+//! row, and the body of a request by an [`Announced`] in memory. The transaction that stores files checks the limit again,
+//! with the true size. Announced bytes take nothing from the disk: an upload must fit when it begins, and the disk is
+//! checked again while it arrives. Otherwise one announcement would refuse the uploads of all others.
 
 use std::collections::HashMap;
 use std::io::ErrorKind;
@@ -15,9 +15,6 @@ use sqlx::types::Uuid;
 use super::owners::Owner;
 use super::resources::ResourceKind;
 use super::{Error, Store, Transaction, sql};
-
-/// Named lock of transactions that compare the announced bytes of all uploads with the free disk.
-const DISK_LOCK: &str = "disk";
 
 /// The limits of a store. By default there are none.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,14 +35,8 @@ pub(super) struct Space {
     refusals: Arc<Refusals>,
 }
 
-/// Announced bytes of the bodies that are being received.
-#[derive(Debug, Default)]
-struct Incoming {
-    /// By owner.
-    announced_bytes: HashMap<Owner, u64>,
-    /// Of all owners, without the bytes that have arrived.
-    missing_bytes: u64,
-}
+/// Announced bytes of the bodies that are being received, by owner.
+type Incoming = HashMap<Owner, u64>;
 
 #[derive(Debug, Default)]
 struct Refusals {
@@ -59,7 +50,7 @@ pub struct Announced {
     owner: Owner,
     n_bytes: u64,
     /// Announced bytes that have not arrived.
-    n_missing: u64,
+    n_left: u64,
 }
 
 /// How received files count before their footage does.
@@ -114,9 +105,11 @@ impl Store {
             store: self.clone(),
             owner: owner.clone(),
             n_bytes: 0,
-            n_missing: 0,
+            n_left: 0,
         };
-        announced.grow(n_bytes, n_bytes).await?;
+        self.check_disk(n_bytes)?;
+        announced.grow(n_bytes).await?;
+        announced.n_left = n_bytes;
         Ok(announced)
     }
 
@@ -173,7 +166,7 @@ impl Store {
 
     /// Returns the announced size of all bodies that are being received, bytes.
     pub(super) fn incoming_bytes(&self) -> u64 {
-        self.space.incoming().announced_bytes.values().sum()
+        self.space.incoming().values().sum()
     }
 
     /// Fails with [`Error::OwnerStorageFull`] if the owner cannot have `n_bytes` more. `instead_of` is an upload that
@@ -197,15 +190,15 @@ impl Store {
     }
 
     /// Fails with [`Error::OwnerStorageFull`] or [`Error::TooManyUploads`] if the owner cannot begin a resumable upload of
-    /// `n_bytes`, and with `storage_full` if the disk has no space for all announced bytes. The result holds until the
-    /// end of the transaction.
+    /// `n_bytes`, and with `storage_full` if the disk has no space for it. The limits of the owner hold until the end of
+    /// the transaction.
     pub(super) async fn require_upload_space(
         &self,
         transaction: &mut Transaction,
         owner: &Owner,
         n_bytes: u64,
     ) -> Result<(), Error> {
-        transaction.lock(DISK_LOCK).await?;
+        self.check_disk(n_bytes)?;
         lock_space(transaction, owner).await?;
         let used_bytes: i64 = owner_bytes(owner, None)
             .fetch_one(&mut *transaction)
@@ -220,19 +213,7 @@ impl Store {
         if max_uploads > 0 && n_uploads >= max_uploads {
             return Err(Error::TooManyUploads { max_uploads });
         }
-        let missing_bytes = self.missing_here(missing().fetch_all(transaction).await?);
-        self.check_disk(missing_bytes.saturating_add(n_bytes))
-    }
-
-    /// Returns the bytes that uploads to the disk of this machine have announced and not sent yet. `uploads` are all
-    /// open ones. Those to a bucket need the disk only while they become footage.
-    fn missing_here(&self, uploads: Vec<(Uuid, i64)>) -> u64 {
-        let is_local = !self.blobs.are_in_bucket();
-        let is_here =
-            |id: Uuid| is_local && (self.reader.is_file() || self.upload_path(id).exists());
-        let here = uploads.into_iter().filter(|(id, _)| is_here(*id));
-        let of_uploads: u64 = here.map(|(_, n_bytes)| n_bytes.unsigned_abs()).sum();
-        of_uploads + self.space.incoming().missing_bytes
+        Ok(())
     }
 }
 
@@ -243,8 +224,7 @@ impl Space {
 
     /// Returns the announced size of the bodies of an owner, bytes.
     fn announced_bytes(&self, owner: &Owner) -> u64 {
-        let incoming = self.incoming();
-        incoming.announced_bytes.get(owner).copied().unwrap_or(0)
+        self.incoming().get(owner).copied().unwrap_or(0)
     }
 
     fn max_owner_bytes(&self) -> Option<u64> {
@@ -269,35 +249,28 @@ impl Space {
 impl Announced {
     /// Counts `n_bytes` that have arrived. Fails if there is no space for more.
     pub async fn receive(&mut self, n_bytes: u64) -> Result<(), Error> {
-        let n_announced = n_bytes.min(self.n_missing);
-        if n_announced == n_bytes {
-            self.store.check_disk(0)?;
-        } else {
-            self.grow(n_bytes - n_announced, 0).await?;
+        self.store.check_disk(0)?;
+        let n_announced = n_bytes.min(self.n_left);
+        if n_announced < n_bytes {
+            self.grow(n_bytes - n_announced).await?;
         }
-        self.n_missing -= n_announced;
-        self.store.space.incoming().missing_bytes -= n_announced;
+        self.n_left -= n_announced;
         Ok(())
     }
 
-    /// Announces `n_bytes` more, of which `n_missing` have not arrived.
-    async fn grow(&mut self, n_bytes: u64, n_missing: u64) -> Result<(), Error> {
+    /// Announces `n_bytes` more.
+    async fn grow(&mut self, n_bytes: u64) -> Result<(), Error> {
         let store = &self.store;
         let used_bytes = owner_bytes(&self.owner, None).fetch_one(&store.reader);
         let used_bytes: i64 = used_bytes.await?;
-        let missing_bytes = store.missing_here(missing().fetch_all(&store.reader).await?);
-        store.check_disk(missing_bytes.saturating_add(n_missing))?;
         // Counted and added under one lock, so that simultaneous bodies do not exceed the limit.
         let mut incoming = store.space.incoming();
-        let announced = incoming.announced_bytes.entry(self.owner.clone());
-        let announced_bytes = announced.or_default();
+        let announced_bytes = incoming.entry(self.owner.clone()).or_default();
         let used_bytes = used_bytes.unsigned_abs() + *announced_bytes;
         store.space.check_owner(used_bytes, n_bytes)?;
         *announced_bytes += n_bytes;
-        incoming.missing_bytes += n_missing;
         drop(incoming);
         self.n_bytes += n_bytes;
-        self.n_missing += n_missing;
         Ok(())
     }
 }
@@ -305,12 +278,10 @@ impl Announced {
 impl Drop for Announced {
     fn drop(&mut self) {
         let mut incoming = self.store.space.incoming();
-        incoming.missing_bytes -= self.n_missing;
-        let announced_bytes = incoming.announced_bytes.entry(self.owner.clone());
-        let announced_bytes = announced_bytes.or_default();
+        let announced_bytes = incoming.entry(self.owner.clone()).or_default();
         *announced_bytes -= self.n_bytes;
         if *announced_bytes == 0 {
-            incoming.announced_bytes.remove(&self.owner);
+            incoming.remove(&self.owner);
         }
     }
 }
@@ -342,11 +313,6 @@ fn owner_bytes(owner: &Owner, but: Option<Uuid>) -> sql::ScalarQuery {
         stored.concat()
     );
     sql::query_scalar(sql).bind(owner).bind(but)
-}
-
-/// Returns the query for the bytes that each open upload has announced and not sent yet.
-fn missing() -> sql::Query {
-    sql::query("select id, size_bytes - offset_bytes from uploads where footage_id is null")
 }
 
 #[cfg(test)]

@@ -20,4 +20,4 @@ pub(super) use guard::{HostNames, guard};
 pub(super) use held_body::hold_until_sent;
 pub use link::signed;
 pub(super) use open_requests::OpenRequests;
-pub(super) use rate::Rates;
+pub(super) use rate::{Rates, network_of};

@@ -20,18 +20,19 @@ const BURST_S: f64 = 4.0;
 /// Number of buckets from which full ones are removed. A removed bucket counts as full. Free choice.
 const MAX_BUCKETS: usize = 10_000;
 
-/// Refused requests that an address may make at once, and per second. Free choice.
-const REFUSALS: Limit = Limit {
+/// Refused requests of an address, and sessions of an owner, at once and per second. Free choice.
+const RARE: Limit = Limit {
     burst: 30.0,
     per_s: 1.0,
 };
 
-/// Buckets of all owners, and of all addresses with refused requests.
+/// Buckets of the requests and sessions of all owners, and of all addresses with refused requests.
 #[derive(Debug)]
 pub(in crate::api) struct Rates {
     /// Requests per second of each owner; 0 = no limit.
     per_s: f64,
     owners: Buckets<Owner>,
+    sessions: Buckets<Owner>,
     refused_addresses: Buckets<IpAddr>,
 }
 
@@ -59,6 +60,7 @@ impl Rates {
         Rates {
             per_s: f64::from(per_s),
             owners: Buckets(Mutex::default()),
+            sessions: Buckets(Mutex::default()),
             refused_addresses: Buckets(Mutex::default()),
         }
     }
@@ -76,15 +78,23 @@ impl Rates {
         self.owners.take(&account.owner, limit, now)
     }
 
+    /// Takes one request and one session from the buckets of the account's owner. Returns false if one is empty.
+    pub(super) fn take_session(&self, account: &Account, now: Instant) -> bool {
+        self.take(account, now) && self.sessions.take(&account.owner, RARE, now)
+    }
+
     /// Takes one refusal from the bucket of an address. Returns false if the bucket is empty. Requests with a
     /// valid token from this address are not affected.
     pub(super) fn take_refusal(&self, peer: IpAddr, now: Instant) -> bool {
-        // A client with one IPv6 address usually has its whole /64 network, so the network shares a bucket.
-        let network = match peer {
-            IpAddr::V4(_) => peer,
-            IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() >> 64 << 64).into(),
-        };
-        self.refused_addresses.take(&network, REFUSALS, now)
+        self.refused_addresses.take(&network_of(peer), RARE, now)
+    }
+}
+
+/// Returns the address by which a client is counted. A client with one IPv6 address usually has its whole /64 network.
+pub(in crate::api) fn network_of(peer: IpAddr) -> IpAddr {
+    match peer {
+        IpAddr::V4(_) => peer,
+        IpAddr::V6(address) => Ipv6Addr::from_bits(address.to_bits() >> 64 << 64).into(),
     }
 }
 
@@ -133,6 +143,20 @@ mod tests {
             20,
             "no more than a burst is saved"
         );
+    }
+
+    #[test]
+    fn sessions_take_from_the_rate_of_their_owner_and_have_a_lower_one() {
+        let now = Instant::now();
+        let owner = Account {
+            quota: Some(1),
+            ..Account::local()
+        };
+        for (rate, n_sessions) in [(5, 20), (200, 30), (0, 30)] {
+            let rates = Rates::new(rate);
+            let taken = (0..100).filter(|_| rates.take_session(&owner, now));
+            assert_eq!(taken.count(), n_sessions, "{rate}");
+        }
     }
 
     #[test]

@@ -2,6 +2,8 @@
 //! (docs/explanation/promises.md, "No cross-site writes"). A session ends after a week, with its token, or
 //! when the user signs out.
 
+use std::time::Instant;
+
 use axum::body::Body;
 use axum::extract::State;
 use axum::http::{HeaderMap, Response, StatusCode, header};
@@ -16,6 +18,7 @@ use crate::api::extract::Json;
 use crate::api::problem::{Problem, ProblemBody};
 use crate::api::timestamp::rfc3339;
 use crate::jobs::clock::now_ms;
+use flockreel_core::code::Code;
 
 /// Longest session, ms: one week. Free choice.
 const SESSION_MS: i64 = 7 * 24 * 3600 * 1000;
@@ -41,7 +44,8 @@ pub(in crate::api) struct SessionView {
 
 /// Sign in from a browser.
 ///
-/// Exchanges a token for a session cookie. An invalid token fails with `unauthenticated`. A proxy that
+/// Exchanges a token for a session cookie. An invalid token fails with `unauthenticated`. Of one token, the latest 64
+/// sessions are valid. A proxy that
 /// provides HTTPS must send `X-Forwarded-Proto: https`, so that the cookie is marked `Secure`.
 #[utoipa::path(post, path = "/v1/session", request_body = SessionRequest, security(()), responses(
     (status = 201, body = SessionView, headers(("set-cookie" = String))),
@@ -53,6 +57,9 @@ pub(in crate::api) async fn begin_session(
     Json(request): Json<SessionRequest>,
 ) -> Result<Response<Body>, Problem> {
     let token = valid_token(&state, request.token.trim()).await?;
+    if !state.rates.take_session(&token.account(), Instant::now()) {
+        return Err(Code::RateLimited.into());
+    }
     let now_ms = now_ms();
     let latest_ms = now_ms + SESSION_MS;
     let expires_ms = token

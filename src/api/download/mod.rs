@@ -3,7 +3,7 @@
 //!
 //! Stored files never change, so clients may cache them forever. The ETag is the SHA-256 of the content.
 
-pub(super) mod compression; // gzip and zstd
+pub(super) mod compression; // gzip
 pub(super) mod if_match;
 pub(super) mod names; // names of saved files
 mod range;

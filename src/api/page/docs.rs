@@ -4,36 +4,27 @@
 //! The files of Swagger UI are embedded in the program. The pages load nothing from other sites and have no
 //! inline scripts or styles (docs/explanation/promises.md, "Nothing served runs as a page").
 
-use std::borrow::Cow;
 use std::sync::{Arc, LazyLock};
 
 use axum::Router;
 use axum::body::Body;
-use axum::http::{HeaderMap, Response, header};
-use axum::response::{Html, IntoResponse};
+use axum::http::{HeaderMap, Response};
+use axum::response::Html;
 use axum::routing::get;
-use sha2::{Digest, Sha256};
 use utoipa_swagger_ui::Config;
 
-use super::{media_type, tagged};
+use super::asset::Asset;
 use crate::api::extract::FileName;
 use crate::api::problem::status_of;
 use crate::api::{AppState, Problem};
-use crate::store::blobs::hex;
 use flockreel_core::code::Code;
 
 /// Files of Swagger UI that the page loads. Its other files are not served.
 const FILES: [&str; 2] = ["swagger-ui.css", "swagger-ui-bundle.js"];
 
 static ERRORS: LazyLock<String> = LazyLock::new(errors);
-static LOADED: LazyLock<Vec<Loaded>> = LazyLock::new(|| FILES.iter().filter_map(load).collect());
-
-/// An embedded file of Swagger UI.
-struct Loaded {
-    name: &'static str,
-    bytes: Cow<'static, [u8]>,
-    etag: String,
-}
+static LOADED: LazyLock<Vec<(&str, Asset)>> =
+    LazyLock::new(|| FILES.iter().filter_map(load).collect());
 
 /// Returns the routes `/docs` and `/docs/errors` and those of the files that they load.
 pub(in crate::api) fn routes() -> Router<AppState> {
@@ -44,23 +35,14 @@ pub(in crate::api) fn routes() -> Router<AppState> {
 }
 
 async fn get_file(FileName(name): FileName, headers: HeaderMap) -> Result<Response<Body>, Problem> {
-    let file = LOADED.iter().find(|file| file.name == name);
-    let file = file.ok_or_else(Problem::not_found)?;
-    let media_type = [(header::CONTENT_TYPE, media_type(file.name))];
-    Ok(tagged(&headers, &file.etag, || {
-        (media_type, file.bytes.clone().into_owned()).into_response()
-    }))
+    let file = LOADED.iter().find(|(known, _)| *known == name);
+    let (_, file) = file.ok_or_else(Problem::not_found)?;
+    Ok(file.answer(&headers))
 }
 
-fn load(name: &&'static str) -> Option<Loaded> {
+fn load(name: &&'static str) -> Option<(&'static str, Asset)> {
     let file = utoipa_swagger_ui::serve(name, Arc::new(Config::default()));
-    let bytes = file.ok()??.bytes.into_owned();
-    let etag = format!("\"{}\"", hex(&Sha256::digest(&bytes)));
-    Some(Loaded {
-        name,
-        bytes: Cow::Owned(bytes),
-        etag,
-    })
+    Some((name, Asset::fixed(name, file.ok()??.bytes)))
 }
 
 fn description() -> String {
@@ -141,7 +123,7 @@ mod tests {
 
     #[test]
     fn swagger_files_are_embedded() {
-        let sizes: Vec<_> = LOADED.iter().map(|file| file.bytes.len()).collect();
+        let sizes: Vec<_> = LOADED.iter().map(|(_, file)| file.bytes.len()).collect();
         assert!(
             sizes.len() == 2 && sizes.iter().all(|&n_bytes| n_bytes > 50_000),
             "{sizes:?}"

@@ -1,8 +1,8 @@
 //! The web page: the files of `static/` and the vendored libraries, embedded in the program. A debug build
 //! reads them from disk. The ETag of a file is the hash of its content.
 
+mod asset; // files in memory
 pub(super) mod docs; // /docs, /docs/errors
-
 pub(super) mod errors; // /v1/errors
 pub(super) mod examples; // tags and examples of the OpenAPI document
 pub(super) mod openapi; // /openapi.json
@@ -12,12 +12,13 @@ use axum::body::Body;
 use axum::http::{HeaderMap, Method, Response, StatusCode, header};
 use axum::response::IntoResponse;
 use axum::routing::get;
-use rust_embed::{EmbeddedFile, RustEmbed};
+use rust_embed::RustEmbed;
+
+use asset::Asset;
 
 use crate::api::download::matches;
 use crate::api::extract::FileName;
 use crate::api::{AppState, Problem};
-use crate::store::blobs::hex;
 
 #[derive(RustEmbed)]
 #[folder = "static/"]
@@ -67,7 +68,7 @@ pub(super) async fn get_missing(method: Method, headers: HeaderMap) -> Response<
     if !is_read || !is_browser {
         return ([vary], Problem::not_found()).into_response();
     }
-    let page = Static::get("index.html").map(|file| file.data.into_owned());
+    let page = Static::get("index.html").map(|file| Asset::of("index.html", file).bytes.clone());
     let headers = [(header::CONTENT_TYPE, media_type("index.html")), vary];
     (StatusCode::NOT_FOUND, headers, page.unwrap_or_default()).into_response()
 }
@@ -81,10 +82,7 @@ async fn get_file<Files: RustEmbed>(
 
 fn answer<Files: RustEmbed>(path: &str, headers: &HeaderMap) -> Result<Response<Body>, Problem> {
     let file = Files::get(path).ok_or_else(Problem::not_found)?;
-    let media_type = [(header::CONTENT_TYPE, media_type(path))];
-    Ok(tagged(headers, &etag(&file), || {
-        (media_type, file.data.into_owned()).into_response()
-    }))
+    Ok(Asset::of(path, file).answer(headers))
 }
 
 /// Returns a response with its ETag, or 304 if the client already has this version.
@@ -104,10 +102,6 @@ pub(super) fn tagged(
         return (StatusCode::NOT_MODIFIED, tags).into_response();
     }
     (tags, answer()).into_response()
-}
-
-fn etag(file: &EmbeddedFile) -> String {
-    format!("\"{}\"", hex(&file.metadata.sha256_hash()))
 }
 
 pub(super) fn media_type(path: &str) -> &'static str {

@@ -1,7 +1,9 @@
 //! The OpenAPI 3.1 document, generated from the handlers and their types.
 
+use std::sync::Arc;
+
 use axum::Router;
-use axum::http::header;
+use axum::http::HeaderMap;
 use axum::routing::get;
 use serde_json::Value;
 use utoipa::Modify;
@@ -12,6 +14,7 @@ use utoipa::openapi::schema::{
 use utoipa::openapi::security::{ApiKey, ApiKeyValue, HttpAuthScheme, HttpBuilder, SecurityScheme};
 use utoipa::openapi::{OpenApi, RefOr, Required};
 
+use super::asset::Asset;
 use crate::api::{AppState, idempotency};
 use flockreel_core::parameters::Parameters;
 use flockreel_core::{analysis, fish, flock};
@@ -138,7 +141,8 @@ impl Modify for Schemes {
 
 /// Returns the route `/openapi.json`.
 pub(in crate::api) fn route(document: &utoipa::openapi::OpenApi) -> Router<AppState> {
-    let text = document.to_json().unwrap_or_default();
-    let answer = move || async move { ([(header::CONTENT_TYPE, "application/json")], text) };
+    let text = document.to_json().unwrap_or_default().into_bytes();
+    let asset = Arc::new(Asset::fixed("openapi.json", text.into()));
+    let answer = move |headers: HeaderMap| async move { asset.answer(&headers) };
     Router::new().route("/openapi.json", get(answer))
 }

@@ -1,13 +1,14 @@
 //! The accept loop and the graceful stop (docs/explanation/promises.md, "Slow clients" and "Graceful stop").
 //!
 //! `axum::serve` installs no timer, so the header timeout of hyper would have no effect. This loop installs
-//! one. If all connections are in use, idle ones give way. If all have a request under way, a few more are
+//! one. If all connections are in use, others give way (`connections`). If none does, a few more are
 //! accepted for one response each: `busy`, or that of /healthz.
 
-mod idle;
+mod connections;
 mod slow_clients;
 
 use std::io;
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -26,19 +27,19 @@ use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 use tower::ServiceExt;
 
-use idle::{IdleConnections, Idleness};
+use connections::{Connection, Connections};
 pub(super) use slow_clients::is_too_slow;
-use slow_clients::{MinRateBody, Unread, WriteTimeout};
+use slow_clients::{MinRateBody, MinRateStream, Unread};
 
 use super::Problem;
-use super::access::{Peer, hold_until_sent};
+use super::access::{Peer, hold_until_sent, network_of};
 use flockreel_core::code::Code;
 
 /// Largest number of connections that are served normally. Free choice.
 const MAX_CONNECTIONS: usize = 2048;
 /// Largest number of further connections, which get one response each. Free choice.
 const MAX_OVERFLOW_CONNECTIONS: usize = 64;
-/// Longest wait for an idle connection to close. It needs no message from its client.
+/// Longest wait for a connection that gives way. It needs no message from its client.
 const GIVE_WAY_TIMEOUT: Duration = Duration::from_millis(100);
 /// Longest wait for the head of a request, and for the next request on an idle connection. Free choice.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(30);
@@ -100,7 +101,7 @@ struct Acceptor {
     overflow_router: Router,
     permits: Arc<Semaphore>,
     overflow_permits: Arc<Semaphore>,
-    idle: IdleConnections,
+    connections: Connections,
 }
 
 impl Acceptor {
@@ -116,7 +117,7 @@ impl Acceptor {
             router,
             permits: Arc::new(Semaphore::new(n_permits)),
             overflow_permits: Arc::new(Semaphore::new(n_overflow_permits)),
-            idle: IdleConnections::default(),
+            connections: Connections::default(),
         }
     }
 
@@ -130,20 +131,19 @@ impl Acceptor {
         loop {
             match self.accept().await {
                 Ok(connection) => {
-                    let (builder, router) = if connection.is_overflow {
-                        (one_request_builder(), self.overflow_router.clone())
+                    let (builder, router, table) = if connection.is_overflow {
+                        let table = Connections::default();
+                        (one_request_builder(), self.overflow_router.clone(), table)
                     } else {
-                        (builder.clone(), self.router.clone())
+                        (
+                            builder.clone(),
+                            self.router.clone(),
+                            self.connections.clone(),
+                        )
                     };
-                    let line = if connection.is_overflow {
-                        &IdleConnections::default()
-                    } else {
-                        &self.idle
-                    };
-                    let (stop, idleness) = (stop.clone(), line.enter());
+                    let (stop, entry) = (stop.clone(), table.enter(network_of(connection.peer)));
                     connections.spawn(async move {
-                        answer(&builder, connection.stream, router, stop, idleness).await;
-                        drop(connection.permit);
+                        answer(&builder, connection, router, stop, entry).await;
                     });
                 }
                 Err(error) => {
@@ -155,7 +155,7 @@ impl Acceptor {
         }
     }
 
-    async fn accept(&self) -> io::Result<Connection> {
+    async fn accept(&self) -> io::Result<Accepted> {
         let usual_permit = || self.permits.clone().try_acquire_owned().ok();
         let (mut permit, mut is_overflow) = match usual_permit() {
             Some(permit) => (permit, false),
@@ -164,12 +164,13 @@ impl Acceptor {
                 (permit.map_err(io::Error::other)?, true)
             }
         };
-        let (stream, _) = self.listener.accept().await?;
+        let (stream, peer) = self.listener.accept().await?;
+        let peer = peer.ip();
         stream.set_nodelay(true)?;
         // Another connection may have closed during the wait, or may close now.
         if is_overflow {
             let usual = match usual_permit() {
-                None if self.idle.close_longest() => {
+                None if self.connections.make_room(network_of(peer)) => {
                     let closed = self.permits.clone().acquire_owned();
                     timeout(GIVE_WAY_TIMEOUT, closed)
                         .await
@@ -182,20 +183,23 @@ impl Acceptor {
                 (permit, is_overflow) = (usual, false);
             }
         }
-        Ok(Connection {
+        Ok(Accepted {
             stream,
-            permit,
+            peer,
             is_overflow,
+            _permit: permit,
         })
     }
 }
 
 /// An accepted connection.
-struct Connection {
+struct Accepted {
     stream: TcpStream,
-    permit: OwnedSemaphorePermit,
+    /// Address of the other end.
+    peer: IpAddr,
     /// Whether the connection is beyond the limit.
     is_overflow: bool,
+    _permit: OwnedSemaphorePermit,
 }
 
 /// Middleware of connections beyond the limit: refuses requests with `busy`, except /healthz.
@@ -206,26 +210,24 @@ async fn answer_overflow(request: Request, next: Next) -> Response {
     }
 }
 
-/// Serves one connection to its end. Once `stop` is cancelled, only the current request is finished. An idle
-/// connection ends at once if it has to give way.
+/// Serves one connection to its end. Once `stop` is cancelled, only the current request is finished. A connection that
+/// gives way ends at once.
 async fn answer(
     builder: &Builder<TokioExecutor>,
-    stream: TcpStream,
+    accepted: Accepted,
     router: Router,
     stop: CancellationToken,
-    idleness: Arc<Idleness>,
+    entry: Arc<Connection>,
 ) {
-    let peer = stream.peer_addr().map(|address| Peer(address.ip())).ok();
+    let peer = Peer(accepted.peer);
     let unread = Unread::default();
-    let stream = WriteTimeout::new(stream, unread.clone());
-    let (begun, ending) = (idleness.clone(), idleness.clone());
+    let stream = MinRateStream::new(accepted.stream, unread.clone());
+    let (begun, ending) = (entry.clone(), entry.clone());
     // HTTP/1 answers one request after the other, so a response belongs to the request before it.
     let router = router
         .map_request(move |mut request: Request<Incoming>| {
-            begun.end();
-            if let Some(peer) = peer {
-                request.extensions_mut().insert(peer);
-            }
+            begun.begin();
+            request.extensions_mut().insert(peer);
             request.map(|body| MinRateBody::new(body, unread.clone()))
         })
         .map_response(move |response| hold_until_sent(response, ending.busy()));
@@ -238,14 +240,7 @@ async fn answer(
             connection.as_mut().graceful_shutdown();
             connection.await
         }
-        () = idleness.must_close() => {
-            if !idleness.is_busy() {
-                return;
-            }
-            // A request has just begun.
-            connection.as_mut().graceful_shutdown();
-            connection.await
-        }
+        () = entry.must_close() => return,
     };
     if let Err(error) = ended {
         tracing::debug!(error, "a connection ended early");

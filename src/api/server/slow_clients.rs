@@ -1,8 +1,8 @@
 //! Limits for slow clients (docs/explanation/promises.md, "Slow clients").
 //!
-//! Every client occupies one of a limited number of connections. It must therefore read a part of the
-//! response from time to time, and send a body at a minimum average rate. Time during which the client waits
-//! for the server does not count.
+//! Every client occupies one of a limited number of connections. It must therefore send and read at a minimum average
+//! rate, and read a part of the response from time to time. Time during which the client waits for the server does not
+//! count.
 //!
 //! A connection lingers if its last request was answered before its body was read: the rest of the body is
 //! received and dropped for a while. Otherwise a client that is still sending would see a broken connection
@@ -21,9 +21,10 @@ use tokio::time::{Instant, Sleep, sleep};
 
 /// Longest time during which a client may read nothing of a response. Free choice.
 const MAX_WRITE_WAIT: Duration = Duration::from_secs(60);
-/// Total waiting time that every body may cause, in addition to what its length allows. Free choice.
+/// Total waiting time that every body, and every connection that is read, may cause in addition to what its length
+/// allows. Free choice.
 const GRACE: Duration = Duration::from_secs(30);
-/// Minimum average rate of a body, bytes per second. Any line that is used to send videos is faster.
+/// Minimum average rate of a body and of reading, bytes per second. Any line that is used to send videos is faster.
 const MIN_BYTES_PER_S: f64 = 1024.0;
 
 /// Longest time that a connection lingers, and longest pause of its client. Those of nginx.
@@ -34,47 +35,81 @@ const MAX_LINGER_PAUSE: Duration = Duration::from_secs(5);
 #[derive(Clone, Debug, Default)]
 pub(super) struct Unread(Arc<AtomicBool>);
 
-/// A connection whose writes fail if the client reads nothing for too long, and which may linger.
-pub(super) struct WriteTimeout<S> {
+/// A connection whose writes fail if the client reads nothing for too long, or too slowly, and which may linger.
+pub(super) struct MinRateStream<S> {
     stream: S,
     unread: Unread,
     /// End of lingering, and end of the client's pause.
     lingering: Option<(Instant, Pin<Box<Sleep>>)>,
     max_wait: Duration,
-    waiting: Option<Pin<Box<Sleep>>>,
+    allowed: Allowed,
 }
 
-impl<S> WriteTimeout<S> {
-    pub(super) fn new(stream: S, unread: Unread) -> WriteTimeout<S> {
-        WriteTimeout {
-            stream,
-            unread,
-            lingering: None,
-            max_wait: MAX_WRITE_WAIT,
+/// The waiting time that a client may cause: it grows with the bytes of the client.
+struct Allowed {
+    grace: Duration,
+    n_bytes: f64,
+    /// Time spent waiting so far.
+    waited: Duration,
+    /// Start of the current wait, and the timer that limits it.
+    waiting: Option<(Instant, Pin<Box<Sleep>>)>,
+}
+
+impl Allowed {
+    fn new(grace: Duration) -> Allowed {
+        Allowed {
+            grace,
+            n_bytes: 0.0,
+            waited: Duration::ZERO,
             waiting: None,
         }
     }
 
-    /// Passes on the result of a write. Fails with `TimedOut` if the write has been pending for too long.
+    /// Ends a wait, after which the client has sent or read `n_bytes` more.
+    fn end_wait(&mut self, n_bytes: usize) {
+        if let Some((since, _)) = self.waiting.take() {
+            self.waited += since.elapsed();
+        }
+        self.n_bytes += n_bytes as f64;
+    }
+
+    /// Is ready once the client has caused too much waiting, or this wait is longer than `longest`.
+    fn poll_end(&mut self, context: &mut Context<'_>, longest: Duration) -> Poll<()> {
+        let allowed = self.grace + Duration::from_secs_f64(self.n_bytes / MIN_BYTES_PER_S);
+        let left = allowed.saturating_sub(self.waited).min(longest);
+        let begin = || (Instant::now(), Box::pin(sleep(left)));
+        let (_since, end) = self.waiting.get_or_insert_with(begin);
+        end.as_mut().poll(context)
+    }
+}
+
+impl<S> MinRateStream<S> {
+    pub(super) fn new(stream: S, unread: Unread) -> MinRateStream<S> {
+        MinRateStream {
+            stream,
+            unread,
+            lingering: None,
+            max_wait: MAX_WRITE_WAIT,
+            allowed: Allowed::new(GRACE),
+        }
+    }
+
+    /// Passes on the result of a write. Fails with `TimedOut` if the client reads too slowly.
     fn limit_wait(
         &mut self,
         context: &mut Context<'_>,
         written: Poll<io::Result<usize>>,
     ) -> Poll<io::Result<usize>> {
-        if written.is_ready() {
-            self.waiting = None;
-            return written;
+        if let Poll::Ready(written) = written {
+            self.allowed.end_wait(*written.as_ref().unwrap_or(&0));
+            return Poll::Ready(written);
         }
-        let max_wait = self.max_wait;
-        let waiting = self
-            .waiting
-            .get_or_insert_with(|| Box::pin(sleep(max_wait)));
-        ready!(waiting.as_mut().poll(context));
+        ready!(self.allowed.poll_end(context, self.max_wait));
         Poll::Ready(Err(io::ErrorKind::TimedOut.into()))
     }
 }
 
-impl<S: AsyncRead + Unpin> WriteTimeout<S> {
+impl<S: AsyncRead + Unpin> MinRateStream<S> {
     /// Receives and drops what the client still sends, until it closes the connection or takes too long.
     fn poll_linger(&mut self, context: &mut Context<'_>) -> Poll<()> {
         let mut bytes = [0; 16 << 10];
@@ -97,7 +132,7 @@ impl<S: AsyncRead + Unpin> WriteTimeout<S> {
     }
 }
 
-impl<S: AsyncRead + AsyncWrite + Unpin> AsyncWrite for WriteTimeout<S> {
+impl<S: AsyncRead + AsyncWrite + Unpin> AsyncWrite for MinRateStream<S> {
     fn poll_write(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -135,7 +170,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> AsyncWrite for WriteTimeout<S> {
     }
 }
 
-impl<S: AsyncRead + Unpin> AsyncRead for WriteTimeout<S> {
+impl<S: AsyncRead + Unpin> AsyncRead for MinRateStream<S> {
     fn poll_read(
         mut self: Pin<&mut Self>,
         context: &mut Context<'_>,
@@ -167,12 +202,7 @@ pub(super) struct MinRateBody<B: Body> {
     body: B,
     unread: Unread,
     is_at_end: bool,
-    grace: Duration,
-    /// Total time spent waiting for the chunks received so far.
-    waited: Duration,
-    /// Start of the current wait, and the timer that limits it.
-    waiting: Option<(Instant, Pin<Box<Sleep>>)>,
-    n_bytes: f64,
+    allowed: Allowed,
 }
 
 impl<B: Body> MinRateBody<B> {
@@ -183,10 +213,7 @@ impl<B: Body> MinRateBody<B> {
             body,
             unread,
             is_at_end: false,
-            grace: GRACE,
-            waited: Duration::ZERO,
-            waiting: None,
-            n_bytes: 0.0,
+            allowed: Allowed::new(GRACE),
         }
     }
 }
@@ -205,21 +232,14 @@ where
     ) -> Poll<Option<Result<Frame<B::Data>, axum::BoxError>>> {
         let this = &mut *self;
         if let Poll::Ready(frame) = Pin::new(&mut this.body).poll_frame(context) {
-            if let Some((since, _)) = this.waiting.take() {
-                this.waited += since.elapsed();
-            }
             let data = frame
                 .as_ref()
                 .and_then(|frame| frame.as_ref().ok()?.data_ref());
-            this.n_bytes += data.map_or(0, Buf::remaining) as f64;
+            this.allowed.end_wait(data.map_or(0, Buf::remaining));
             this.is_at_end = frame.is_none();
             return Poll::Ready(frame.map(|frame| frame.map_err(Into::into)));
         }
-        let allowed = this.grace + Duration::from_secs_f64(this.n_bytes / MIN_BYTES_PER_S);
-        let left = allowed.saturating_sub(this.waited);
-        let begin = || (Instant::now(), Box::pin(sleep(left)));
-        let (_since, end) = this.waiting.get_or_insert_with(begin);
-        ready!(end.as_mut().poll(context));
+        ready!(this.allowed.poll_end(context, Duration::MAX));
         Poll::Ready(Some(Err(TooSlow.into())))
     }
 
@@ -253,7 +273,7 @@ mod tests {
     #[tokio::test]
     async fn write_times_out_only_if_the_client_reads_nothing() {
         let (ours, mut theirs) = duplex(16);
-        let mut ours = WriteTimeout::new(ours, Unread::default());
+        let mut ours = MinRateStream::new(ours, Unread::default());
         ours.max_wait = SOON;
         let read = async {
             for _ in 0..8 {
@@ -268,6 +288,23 @@ mod tests {
         assert_eq!(refused.kind(), io::ErrorKind::TimedOut);
     }
 
+    #[tokio::test]
+    async fn write_to_a_client_that_reads_below_the_minimum_rate_is_cut_off() {
+        let (ours, mut theirs) = duplex(16);
+        let mut ours = MinRateStream::new(ours, Unread::default());
+        ours.allowed.grace = SOON;
+        let read = async {
+            while theirs.read_exact(&mut [0; 1]).await.is_ok() {
+                tokio::time::sleep(SOON / 4).await;
+            }
+        };
+        let written = tokio::select! {
+            written = ours.write_all(&[7; 1000]) => written,
+            () = read => unreachable!("the stream is open"),
+        };
+        assert_eq!(written.unwrap_err().kind(), io::ErrorKind::TimedOut);
+    }
+
     /// Returns a body of 100 chunks of `n_bytes` bytes, one every tenth of [`SOON`].
     fn dripping(n_bytes: usize) -> MinRateBody<AnyBody> {
         let pieces = unfold(0, move |k| async move {
@@ -275,7 +312,7 @@ mod tests {
             (k < 100).then(|| (Ok::<_, io::Error>(Bytes::from(vec![7; n_bytes])), k + 1))
         });
         let mut body = MinRateBody::new(AnyBody::from_stream(pieces), Unread::default());
-        body.grace = SOON;
+        body.allowed.grace = SOON;
         body
     }
 
@@ -300,7 +337,7 @@ mod tests {
             [b"x"; 3].map(|piece| Ok::<_, io::Error>(Bytes::from_static(piece))),
         ));
         let mut body = MinRateBody::new(body, Unread::default());
-        body.grace = SOON / 10;
+        body.allowed.grace = SOON / 10;
         let mut pieces = AnyBody::new(body).into_data_stream();
         while let Some(piece) = pieces.next().await {
             piece.unwrap();

@@ -1,5 +1,5 @@
-//! The process of an attempt: reads its order, computes, and reports the end. It stops when its stdin ends, and
-//! its worker kills it if it does not.
+//! The process of an attempt, or of a check of received files: reads its order, computes, and reports the end. It stops
+//! when its stdin ends, and its parent kills it if it does not.
 
 use std::io::{self, BufRead, BufReader, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,11 +10,10 @@ use rustix::process::{
     Resource, Rlimit, getpriority_process, getrlimit, setpriority_process, setrlimit,
 };
 
-use super::message::{End, Message, Order};
-use super::{Attempt, Product, Reporter};
-use crate::jobs::{self, Error, refusal};
+use super::message::{End, Job, Message, Order};
+use super::{Attempt, Reporter};
+use crate::jobs::{self, Error, admit, refusal};
 use crate::media;
-use crate::store::BlobFile;
 use crate::store::blobs::seal_folder;
 use crate::store::jobs::Kind;
 
@@ -39,27 +38,34 @@ pub fn run(folder: &Path) -> io::Result<()> {
     stop_at_the_end_of(stdin, reporter.clone())?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(order.threads);
     let pool = pool.build().map_err(io::Error::other)?;
-    let span = tracing::info_span!(
-        "job",
-        job.id = %order.job_id,
-        job.kind = order.kind,
-        attempt = order.attempt,
-        trace_id = order.trace_id
-    );
-    let attempt = Attempt {
-        reporter: &reporter,
-        folder,
-        order: &order,
-    };
-    let result = survive(|| pool.install(|| span.in_scope(|| compute(&attempt))));
-    reporter.send(&Message::End(match result {
-        Ok((product, files)) => End::Done(product, files.into_iter().map(Into::into).collect()),
-        Err(error) => {
-            leave_picture(&error, folder);
-            End::Failed((&error).into())
-        }
-    }));
+    let result = survive(|| {
+        pool.install(|| match &order.job {
+            Some(job) => span_of(job).in_scope(|| {
+                compute(&Attempt {
+                    reporter: &reporter,
+                    folder,
+                    order: &order,
+                    job,
+                })
+            }),
+            None => admit::inspect(folder).map(End::Inspected),
+        })
+    });
+    reporter.send(&Message::End(result.unwrap_or_else(|error| {
+        leave_picture(&error, folder);
+        End::Failed((&error).into())
+    })));
     Ok(())
+}
+
+fn span_of(job: &Job) -> tracing::Span {
+    tracing::info_span!(
+        "job",
+        job.id = %job.id,
+        job.kind = job.kind,
+        attempt = job.attempt,
+        trace_id = job.trace_id
+    )
 }
 
 /// Returns what `work` returns, and an error if it panics.
@@ -67,11 +73,14 @@ fn survive<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or(Err(Error::Panicked))
 }
 
-fn compute(attempt: &Attempt) -> Result<(Product, Vec<BlobFile>), Error> {
-    let order = attempt.order;
-    let kind = Kind::try_from(order.kind.clone())?;
-    let product = jobs::run(kind, &order.input, attempt)?;
-    Ok((product, seal_folder(attempt.folder)?))
+fn compute(attempt: &Attempt) -> Result<End, Error> {
+    let kind = Kind::try_from(attempt.job.kind.clone())?;
+    let product = jobs::run(kind, &attempt.job.input, attempt)?;
+    let files = seal_folder(attempt.folder)?;
+    Ok(End::Done(
+        product,
+        files.into_iter().map(Into::into).collect(),
+    ))
 }
 
 /// Leaves the picture of a failure for the worker. The failure counts even without it.

@@ -1,5 +1,5 @@
-//! What a worker and the process of an attempt tell each other, one line of JSON each: the order on the child's
-//! stdin, then progress and the end of the attempt on its stdout.
+//! What the service and its child tell each other, one line of JSON each: the order on the child's stdin, then progress
+//! and the end on its stdout.
 
 use std::path::PathBuf;
 
@@ -14,8 +14,23 @@ use flockreel_core::ids::JobId;
 /// Everything that the child needs, except the folder for its files, which is its argument.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Order {
+    /// The job; `None` to check received files, which are in the folder of the child.
+    pub(super) job: Option<Job>,
+    /// Folder with the files of the footage or library that a job works on; empty for a sample.
+    pub(super) subject: PathBuf,
+    /// Number of threads to use.
+    pub(super) threads: usize,
+    /// Limit of the memory, bytes.
+    pub(super) memory_bytes: u64,
+    /// The media tools.
+    pub(super) tools: FoundTools,
+}
+
+/// The job of an attempt.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Job {
     /// Id of the job, for the log.
-    pub(super) job_id: JobId,
+    pub(super) id: JobId,
     /// Number of the attempt, for the log.
     pub(super) attempt: i64,
     /// Trace of the request that queued the job, for the log.
@@ -24,16 +39,8 @@ pub(super) struct Order {
     pub(super) kind: String,
     /// Input of the job, JSON.
     pub(super) input: String,
-    /// Folder with the files of the footage or library that the job works on; empty for a sample.
-    pub(super) subject: PathBuf,
     /// Hash and size of the footage that the job works on; `None` for jobs of other kinds.
     pub(super) footage: Option<FootageSummary>,
-    /// Number of threads to use.
-    pub(super) threads: usize,
-    /// Limit of the memory, bytes.
-    pub(super) memory_bytes: u64,
-    /// The media tools.
-    pub(super) tools: FoundTools,
 }
 
 /// A line of the child.
@@ -54,6 +61,8 @@ pub(super) enum Message {
 pub(super) enum End {
     /// The files are complete and synced.
     Done(Product, Vec<File>),
+    /// The received files are a film of this format.
+    Inspected(Film),
     /// There is no result.
     Failed(Failure),
 }
@@ -69,7 +78,7 @@ pub struct Product {
     pub summary: String,
 }
 
-/// Format of a film that a job makes.
+/// Format of a film.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Film {
     /// Width in square pixels.

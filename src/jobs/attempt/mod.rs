@@ -1,11 +1,13 @@
 //! One attempt at a job, in a child process of its own (docs/explanation/promises.md, "Poison jobs"). A job that
-//! exhausts memory, aborts or hangs ends its own process and nothing else.
+//! exhausts memory, aborts or hangs ends its own process and nothing else. Received files are checked in the same way,
+//! so the service itself parses no foreign files.
 //!
 //! The worker's process hands its child local files and parameters, and neither secrets nor the database. The
 //! child writes files to the folder of the attempt, and reports progress and result as lines of JSON.
 
 mod child; // the child: computes and reports
 mod decoding; // metrics of decoding
+mod inspection; // check of received files
 mod message; // what worker and child tell each other
 mod process; // the worker's side: starts the child and follows it
 mod reporter; // progress and cancellation of the child
@@ -15,6 +17,7 @@ use std::sync::Arc;
 
 pub use child::run;
 pub(super) use decoding::Counted;
+pub(super) use inspection::{CHECK_TIME, inspect};
 pub use message::{Film, Product};
 pub(super) use process::compute;
 pub use reporter::Reporter;
@@ -26,7 +29,7 @@ use flockreel_core::formats::library_json::FootageSummary;
 use flockreel_core::library::Library;
 use flockreel_core::progress::Progress;
 use flockreel_core::scratch::Scratch;
-use message::Order;
+use message::{Job, Order};
 
 /// Input and output of an attempt, as the child sees them.
 pub struct Attempt<'a> {
@@ -34,6 +37,7 @@ pub struct Attempt<'a> {
     pub reporter: &'a Reporter,
     folder: &'a Path,
     order: &'a Order,
+    job: &'a Job,
 }
 
 impl Attempt<'_> {
@@ -60,7 +64,7 @@ impl Attempt<'_> {
 
     /// Returns the hash and size of the footage that the job works on. Fails if that is no footage.
     pub fn footage(&self) -> Result<&FootageSummary, Error> {
-        let footage = self.order.footage.as_ref();
+        let footage = self.job.footage.as_ref();
         footage.ok_or_else(|| std::io::Error::other("the attempt has no footage").into())
     }
 

@@ -17,7 +17,7 @@ use tokio_util::task::AbortOnDropHandle;
 use tracing::Instrument;
 use uuid::Uuid;
 
-use super::message::{End, Failure, File, Message, Order};
+use super::message::{End, Failure, File, Job, Message, Order};
 use super::{Film, Product};
 use crate::jobs::error::FailedAttempt;
 use crate::jobs::sample::FILM_NAME;
@@ -134,16 +134,33 @@ async fn compute_in(
     subject: &SubjectFiles,
     draft: &Draft,
 ) -> Result<(Product, Vec<File>), Error> {
-    let tools = spawn_blocking(media::found_tools).await;
-    let order = Order {
-        job_id: lease.job_id,
+    let job = Job {
+        id: lease.job_id,
         attempt: lease.attempt,
         trace_id: lease.trace_id(),
         kind: lease.kind.name().to_owned(),
         input: lease.input.clone(),
-        subject: (subject.files.as_ref())
-            .map_or_else(Default::default, |files| files.path().into()),
         footage: subject.footage.clone(),
+    };
+    let files = subject.files.as_ref().map(|files| files.path());
+    match run_child(context, Some(job), files, draft, listener).await? {
+        End::Done(product, files) => Ok((product, files)),
+        _ => Err(io::Error::other("an attempt has no result").into()),
+    }
+}
+
+/// Runs the child in the folder of the draft, and returns how it ended. Fails with the error that it reports.
+pub(super) async fn run_child(
+    context: &Context,
+    job: Option<Job>,
+    subject: Option<&Path>,
+    draft: &Draft,
+    listener: &Listener,
+) -> Result<End, Error> {
+    let tools = spawn_blocking(media::found_tools).await;
+    let order = Order {
+        job,
+        subject: subject.map_or_else(Default::default, Into::into),
         threads: context.threads,
         memory_bytes: context.memory_bytes,
         tools: tools.map_err(io::Error::other)??,
@@ -153,8 +170,8 @@ async fn compute_in(
     let group = group.map_err(io::Error::other)??;
     let grace = STOP_GRACE.min(context.lease);
     match follow(group, &order, listener, grace).await? {
-        End::Done(product, files) => Ok((product, files)),
         End::Failed(failure) => Err(Error::Attempt(failed(failure, draft))),
+        end => Ok(end),
     }
 }
 

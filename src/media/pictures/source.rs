@@ -58,8 +58,7 @@ impl Source {
         Ok(Some(if is_zip {
             Source::Zip(path, entries_of(file, limits)?)
         } else {
-            let n_pages = tiff_stack::n_pages(&mut tiff_stack::open(file, limits)?, limits)?;
-            Source::Stack(path, n_pages)
+            Source::Stack(path, tiff_stack::n_pages(&mut file, limits)?)
         }))
     }
 

@@ -1,7 +1,6 @@
 //! Pages of a TIFF: gray or RGB of 8 or 16 bits, uncompressed or with lossless compression.
 
-use std::io::{Read, Seek};
-use std::time::Instant;
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
 
 use image::ImageBuffer;
 use tiff::decoder::{Decoder, DecodingResult, Limits as TiffLimits};
@@ -14,6 +13,8 @@ use crate::media::limits::Limits;
 
 /// Largest value of one tag, bytes. The strip offsets of the tallest allowed picture need half of it.
 const MAX_TAG_BYTES: usize = 1 << 17;
+/// Largest number of tags of one page. TIFF 6.0 defines about 80, microscopes add a few dozen.
+const MAX_TAGS: u64 = 1000;
 
 /// Returns whether a file begins like a TIFF or a BigTIFF.
 pub(super) fn is_tiff(head: &[u8]) -> bool {
@@ -33,22 +34,52 @@ pub(super) fn open<R: Read + Seek>(from: R, limits: &Limits) -> Result<Decoder<R
     Ok(decoder.with_limits(bounds))
 }
 
-/// Returns the number of pages. Fails beyond `limits.max_frames`, or if counting takes too long.
-pub(super) fn n_pages<R: Read + Seek>(
-    pages: &mut Decoder<R>,
-    limits: &Limits,
-) -> Result<usize, Error> {
-    let start = Instant::now();
-    let mut n_pages = 1;
-    while pages.more_images() {
-        pages.next_image().map_err(from_tiff)?;
+/// Returns the number of pages, at most `limits.max_frames`. Fails if directories share bytes or are in a circle, because
+/// then a small file would have any number of tags.
+///
+/// Every page has a directory: its number of tags, the tags, and the place of the next directory. Only the first and
+/// the last are read.
+pub(super) fn n_pages(file: &mut (impl Read + Seek), limits: &Limits) -> Result<usize, Error> {
+    let n_file_bytes = file.seek(SeekFrom::End(0)).map_err(from_io)?;
+    let mut head = [0; 4];
+    file.rewind()
+        .and_then(|()| file.read_exact(&mut head))
+        .map_err(from_io)?;
+    let (is_big_endian, is_big_tiff) = (head[0] == b'M', head[2..].contains(&43));
+    // Sizes of the number of tags, of a tag, and of a place in the file.
+    let (count_bytes, tag_bytes, place_bytes) = if is_big_tiff { (8, 20, 8) } else { (2, 12, 4) };
+    // The place of the first directory.
+    let begin = SeekFrom::Start(if is_big_tiff { 8 } else { 4 });
+    file.seek(begin).map_err(from_io)?;
+    let (mut n_pages, mut n_directory_bytes) = (0, 0);
+    loop {
+        let place = number(file, place_bytes, is_big_endian)?;
+        if place == 0 {
+            return Ok(n_pages);
+        }
+        file.seek(SeekFrom::Start(place)).map_err(from_io)?;
+        let n_tags = number(file, count_bytes, is_big_endian)?;
+        n_directory_bytes +=
+            count_bytes as u64 + n_tags.min(MAX_TAGS) * tag_bytes + place_bytes as u64;
+        if n_tags > MAX_TAGS || n_directory_bytes > n_file_bytes {
+            let why = "the TIFF has more tags than its pages need";
+            return Err(Error::NotAVideo(why.to_owned()));
+        }
         n_pages += 1;
         limits.check_n_frames(n_pages)?;
-        if start.elapsed() > limits.base_time {
-            return Err(Error::TimeLimit);
-        }
+        let tags = SeekFrom::Current((n_tags * tag_bytes) as i64);
+        file.seek(tags).map_err(from_io)?;
     }
-    Ok(n_pages)
+}
+
+/// Reads an unsigned number of at most eight bytes.
+fn number(file: &mut impl Read, n_bytes: usize, is_big_endian: bool) -> Result<u64, Error> {
+    let mut bytes = [0; 8];
+    file.read_exact(&mut bytes[..n_bytes]).map_err(from_io)?;
+    if is_big_endian {
+        bytes[..n_bytes].reverse();
+    }
+    Ok(u64::from_le_bytes(bytes))
 }
 
 /// Decodes a page, counted from 0. Fails for samples other than gray or RGB of 8 or 16 bits.
@@ -96,9 +127,61 @@ pub(super) fn page<R: Read + Seek>(
 
 fn from_tiff(error: TiffError) -> Error {
     match error {
-        TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => {
-            Error::io("reading the pictures")(error)
-        }
+        TiffError::IoError(error) => from_io(error),
         error => Error::NotAVideo(format!("the TIFF cannot be read: {error}")),
+    }
+}
+
+fn from_io(error: std::io::Error) -> Error {
+    match error.kind() {
+        ErrorKind::UnexpectedEof | ErrorKind::InvalidInput => {
+            Error::NotAVideo(format!("the TIFF cannot be read: {error}"))
+        }
+        _ => Error::io("reading the pictures")(error),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+
+    /// Returns a file of `n` directories, each `step` bytes after the one before it and with `n_tags` tags.
+    fn chain(n: u32, step: u32, n_tags: u16) -> Vec<u8> {
+        let length = n * step + u32::from(n_tags) * 12 + 14;
+        let mut bytes = vec![0; length as usize];
+        bytes[..8].copy_from_slice(b"II*\0\x08\0\0\0");
+        for k in 0..n {
+            let (at, next) = ((8 + k * step) as usize, 8 + (k + 1) * step);
+            let next = if k + 1 < n { next } else { 0 };
+            bytes[at..at + 2].copy_from_slice(&n_tags.to_le_bytes());
+            let link = at + 2 + usize::from(n_tags) * 12;
+            bytes[link..link + 4].copy_from_slice(&next.to_le_bytes());
+        }
+        bytes
+    }
+
+    fn count(bytes: Vec<u8>) -> Result<usize, Error> {
+        n_pages(&mut Cursor::new(bytes), &Limits::default())
+    }
+
+    #[test]
+    fn pages_are_counted_by_their_links() {
+        assert_eq!(count(chain(5, 200, 12)).ok(), Some(5));
+        assert_eq!(count(chain(5, 200, 0)).ok(), Some(5));
+    }
+
+    #[test]
+    fn overlapping_endless_and_huge_directories_are_refused() {
+        // The tags of each directory are those of many others.
+        assert!(matches!(count(chain(3, 14, 900)), Err(Error::NotAVideo(_))));
+        let mut circle = chain(1, 14, 0);
+        circle[10..14].copy_from_slice(&8_u32.to_le_bytes());
+        assert!(matches!(count(circle), Err(Error::NotAVideo(_))));
+        assert!(matches!(
+            count(chain(1, 14, 1001)),
+            Err(Error::NotAVideo(_))
+        ));
     }
 }

@@ -5,8 +5,12 @@ use super::Token;
 use super::secret::{self, Secret};
 use crate::store::{Error, Store, sql};
 
+/// Largest number of sessions of a token. Free choice: browsers and computers of one person.
+const MAX_SESSIONS: i64 = 64;
+
 impl Store {
-    /// Begins a session of a token and returns the value of the cookie. Expired sessions are deleted first.
+    /// Begins a session of a token and returns the value of the cookie. Expired sessions are deleted first, and the oldest
+    /// ones of the token beyond [`MAX_SESSIONS`].
     pub async fn begin_session(
         &self,
         token_id: &str,
@@ -19,6 +23,14 @@ impl Store {
             .bind(now_ms)
             .execute(&mut transaction)
             .await?;
+        sql::query(
+            "delete from sessions where token_id = $1 and sha256 not in (select sha256 from sessions \
+             where token_id = $1 order by created_ms desc, sha256 limit $2)",
+        )
+        .bind(token_id)
+        .bind(MAX_SESSIONS - 1)
+        .execute(&mut transaction)
+        .await?;
         sql::query(
             "insert into sessions (sha256, token_id, created_ms, expires_ms) \
              values ($1, $2, $3, $4)",
@@ -62,5 +74,45 @@ impl Store {
             Ok(())
         };
         self.reserve.lend(end).await
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::fresh;
+    use crate::store::tokens::{NewToken, Scope};
+
+    #[tokio::test]
+    async fn oldest_sessions_of_a_token_end_when_it_has_too_many() {
+        let data = tempfile::tempdir().unwrap();
+        let store = fresh::open(data.path()).await;
+        let new = NewToken {
+            name: "lab".to_owned(),
+            owner: None,
+            scope: Scope::Read,
+            quota: 1,
+            expires_ms: None,
+        };
+        let (token, _) = store.add_token(&new, 0).await.unwrap();
+        let (other, _) = store.add_token(&new, 0).await.unwrap();
+        let others = store.begin_session(&other.id, 0, 1000).await.unwrap();
+        let mut cookies = Vec::new();
+        for k in 0..MAX_SESSIONS + 3 {
+            cookies.push(store.begin_session(&token.id, k, 1000).await.unwrap());
+        }
+        let mut is_valid = Vec::new();
+        for cookie in &cookies {
+            is_valid.push(store.token_of_session(cookie, 500).await.unwrap().is_some());
+        }
+        let (ended, valid) = is_valid.split_at(3);
+        assert!(ended.iter().all(|is_valid| !is_valid) && valid.iter().all(|is_valid| *is_valid));
+        assert!(
+            store
+                .token_of_session(&others, 500)
+                .await
+                .unwrap()
+                .is_some()
+        );
     }
 }

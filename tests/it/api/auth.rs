@@ -244,3 +244,22 @@ async fn full_queue_refuses_jobs_with_retry_after() {
     app.accept("/v1/analyses", body).await;
     app.assert_sound().await;
 }
+
+#[tokio::test]
+async fn sessions_count_against_the_rate_of_their_owner() {
+    let app = TestApp::start(&["--auth", "required", "--rate", "5"]).await;
+    let token = app.token(Scope::Read, 1).await;
+    let mut n_begun = 0;
+    for _ in 0..60 {
+        let sent = app.post("/v1/session").json(&json!({"token": token}));
+        let answer = sent.send().await.unwrap();
+        if answer.status() == StatusCode::CREATED {
+            n_begun += 1;
+        } else {
+            assert!(answer.headers().contains_key("retry-after"));
+            assert_eq!(code_of(answer, 429).await, "rate_limited");
+        }
+    }
+    assert!((20..50).contains(&n_begun), "{n_begun}");
+    app.assert_sound().await;
+}

@@ -1,18 +1,22 @@
-//! A thousand slow clients at once (docs/explanation/promises.md, "Slow clients"). The service is a process of its own, so
-//! that its memory can be measured.
+//! A thousand slow clients at once, and clients that take all connections (docs/explanation/promises.md, "Slow clients").
+//! The service is a process of its own, so that its memory can be measured.
 
+use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
-use tokio::net::TcpStream;
+use tokio::net::{TcpSocket, TcpStream};
 use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
 
+use crate::common::client;
 use crate::common::film::Films;
 use crate::common::process::Server;
 
 const N_CLIENTS: usize = 1000;
+/// More clients than the service has connections.
+const N_READERS: usize = 2250;
 /// Number of open files that the test and the service need, with room for other tests.
 const OPEN_FILES: u64 = 8192;
 /// The promise is 35 s. A busy machine gets more.
@@ -107,4 +111,55 @@ async fn thousand_slow_clients_are_closed_and_cost_little() {
         waits[waits.len() / 2] < Duration::from_secs(1),
         "/healthz: {waits:?}"
     );
+}
+
+/// Asks for a file from a local address, and reads nothing. Returns the connection.
+async fn ask_without_reading(from: [u8; 4], to: SocketAddr, coding: &str) -> TcpStream {
+    let socket = TcpSocket::new_v4().unwrap();
+    // A small buffer, so that the response waits in the service.
+    socket.set_recv_buffer_size(4096).unwrap();
+    socket.bind((from, 0).into()).unwrap();
+    let mut connection = socket.connect(to).await.unwrap();
+    let request = format!(
+        "GET /docs/swagger-ui-bundle.js HTTP/1.1\r\nhost: localhost\r\naccept-encoding: {coding}\r\n\r\n"
+    );
+    connection.write_all(request.as_bytes()).await.unwrap();
+    connection
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn clients_that_take_all_connections_and_read_nothing_shut_nobody_out() {
+    allow_open_files();
+    let films = Films::new();
+    let server = Server::start(&films.path("data"));
+    // The first response unpacks the file.
+    assert_eq!(server.get("/docs/swagger-ui-bundle.js").await.status(), 200);
+    let before_bytes = server.resident_bytes();
+    let address = server.base.trim_start_matches("http://").parse().unwrap();
+    let mut connections = Vec::new();
+    for k in 0..N_READERS {
+        let coding = ["identity", "gzip"][k % 2];
+        let from = [127, 0, 1, (1 + k % 3) as u8];
+        connections.push(ask_without_reading(from, address, coding).await);
+    }
+    let mut waits = Vec::new();
+    for _ in 0..20 {
+        let asked = Instant::now();
+        // Every request on a connection of its own.
+        let answer = client()
+            .get(format!("{}/v1/footage", server.base))
+            .send()
+            .await;
+        assert_eq!(answer.unwrap().status(), 200);
+        waits.push(asked.elapsed());
+    }
+    waits.sort_unstable();
+    let grown_bytes = server.resident_bytes().saturating_sub(before_bytes);
+    println!("memory +{} KiB, requests {waits:?}", grown_bytes >> 10);
+    assert!(waits[10] < Duration::from_millis(200), "{waits:?}");
+    assert!(
+        grown_bytes < 2 * MAX_GROWTH_BYTES,
+        "the memory grew by {grown_bytes} bytes"
+    );
+    drop(connections);
 }

@@ -56,15 +56,34 @@ impl TestApp {
 
     /// Like [`TestApp::start`], on a place that may have data.
     pub(crate) async fn on(place: Place, flags: &[&str]) -> TestApp {
+        // The program of the test is another one.
+        let program = (env!("CARGO_BIN_EXE_flockreel").into(), Vec::new());
+        TestApp::with_context(place, flags, |context| context.attempt_program = program).await
+    }
+
+    /// Starts a service whose checks of received files run this shell command, for at most two seconds.
+    pub(crate) async fn with_script(script: &str) -> TestApp {
+        let arguments = ["-c", script].map(Into::into).to_vec();
+        TestApp::with_context(Place::from_environment(), &[], |context| {
+            context.attempt_program = ("/bin/sh".into(), arguments);
+            context.check_time = Duration::from_secs(2);
+        })
+        .await
+    }
+
+    async fn with_context(
+        place: Place,
+        flags: &[&str],
+        change: impl FnOnce(&mut Context),
+    ) -> TestApp {
         let flags = flags.iter().map(|flag| (*flag).to_owned());
         let flags = [vec!["test".to_owned()], place.flags(), flags.collect()].concat();
         let config = Arguments::parse_from(flags).config;
         let state = AppState::open(config).await.unwrap();
+        let state = state.with_context(change);
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let base = format!("http://{}", listener.local_addr().unwrap());
-        let (mut context, stop) = (state.context.clone(), CancellationToken::new());
-        // This program is the test.
-        context.attempt_program.0 = env!("CARGO_BIN_EXE_flockreel").into();
+        let (context, stop) = (state.context.clone(), CancellationToken::new());
         tokio::spawn(api::server::serve(
             listener,
             api::router(state),
