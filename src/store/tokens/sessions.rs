@@ -10,7 +10,7 @@ const MAX_SESSIONS: i64 = 64;
 
 impl Store {
     /// Begins a session of a token and returns the value of the cookie. Expired sessions are deleted first, and the oldest
-    /// ones of the token beyond [`MAX_SESSIONS`].
+    /// ones of the token beyond `MAX_SESSIONS`.
     pub async fn begin_session(
         &self,
         token_id: &str,
