@@ -65,7 +65,11 @@ pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, 
 /// Checks the files in a folder without decoding the whole video, and writes its poster. Returns the format of the
 /// video. It parses foreign files, so it runs in a child process.
 pub(super) fn inspect(folder: &Path) -> Result<Film, Error> {
-    let limits = Limits::default();
+    // A sender does not wait long for the poster.
+    let limits = Limits {
+        stall_time: overlay::MAX_POSTER_TIME,
+        ..Limits::default()
+    };
     let path = folder.join(VIDEO);
     let video = Video::open(&path, &limits)?;
     let format = video.format();

@@ -18,7 +18,7 @@ use flockreel_core::raster::Frame;
 /// Last frame that may be the poster of footage. A film cannot be read from its middle. Free choice.
 const MAX_POSTER_FRAME: usize = 30;
 /// Time after which an upload looks for no later frame. Free choice.
-const MAX_POSTER_TIME: Duration = Duration::from_secs(10);
+pub(super) const MAX_POSTER_TIME: Duration = Duration::from_secs(10);
 
 /// Writes a frame as `poster.jpg` into a folder: the middle one, or an earlier one of long footage.
 pub(super) fn write_poster(source: &dyn FrameSource, folder: &Path) -> Result<(), Error> {
