@@ -36,7 +36,9 @@ pub(super) async fn admitted(store: &Store) -> Uuid {
         owner: Owner::local(),
         counted: Counted::Upload(Uuid::nil()),
     };
-    let context = Context::new(store.clone(), 1);
+    let mut context = Context::new(store.clone(), 1);
+    // The program of the test is another one.
+    context.attempt_program.0 = env!("CARGO_BIN_EXE_flockreel").into();
     let (Added::New(footage) | Added::Known(footage)) = admit(&context, received).await.unwrap();
     footage.id
 }
