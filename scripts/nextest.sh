@@ -4,10 +4,12 @@
 #   scripts/nextest.sh [ARGUMENT...]     arguments of `cargo nextest run`, such as -E 'test(boids)'
 set -eu
 cd "$(dirname "$0")/.."
+scripts/system-packages.sh vendor
 scripts/venv.sh target/tools-venv scripts/tools.txt
 profile=default
 case " $* " in *" --profile scale "*) profile=scale ;; esac
 end=0
 PATH=$PWD/target/tools-venv/bin:$PATH cargo nextest run --locked --workspace "$@" || end=$?
-python3 -B scripts/slowest.py "target/nextest/$profile/junit.xml"
+report=target/nextest/$profile/junit.xml
+if [ -f "$report" ]; then python3 -B scripts/slowest.py "$report"; fi
 exit $end

@@ -45,8 +45,7 @@ pub(in crate::api) struct SessionView {
 /// Sign in from a browser.
 ///
 /// Exchanges a token for a session cookie. An invalid token fails with `unauthenticated`. Of one token, the latest 64
-/// sessions are valid. A proxy that
-/// provides HTTPS must send `X-Forwarded-Proto: https`, so that the cookie is marked `Secure`.
+/// sessions are valid. A proxy that provides HTTPS must send `X-Forwarded-Proto: https`, so that the cookie is marked `Secure`.
 #[utoipa::path(post, path = "/v1/session", request_body = SessionRequest, security(()), responses(
     (status = 201, body = SessionView, headers(("set-cookie" = String))),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),

@@ -1,5 +1,5 @@
-//! What the service and its child tell each other, one line of JSON each: the order on the child's stdin, then progress
-//! and the end on its stdout.
+//! Messages between the service and its child, one line of JSON each: the order on the child's stdin, then progress and
+//! the end on its stdout.
 
 use std::path::PathBuf;
 

@@ -269,7 +269,7 @@ async fn announced_bytes_take_no_space_of_the_disk_from_others() {
     app.upload(&numbered_film(0)).await;
     assert_eq!(app.json("/readyz").await["refused"], json!([]));
 
-    // What does not fit is refused when it begins.
+    // An upload that does not fit is refused when it begins.
     let refused = announce(&app, 3 * n_bytes).await;
     assert!(refused.headers().contains_key("retry-after"));
     assert_eq!(code_of(refused, 507).await, "storage_full");
