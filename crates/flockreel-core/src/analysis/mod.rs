@@ -121,6 +121,7 @@ fn analyze_part(
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
     let stats = LibraryStats {
         never_seen_px: background.never_seen_px,
+        still_px: scene.still_px,
         several_animals: scene.several_animals,
         n_foreign_frames: foreign_times_s.len(),
         first_foreign_s: foreign_times_s.first().copied(),

@@ -281,6 +281,9 @@ struct StatsFile {
 #[derive(Serialize, Deserialize)]
 struct BackgroundStats {
     never_seen_px: u64,
+    /// Absent from the files of older versions.
+    #[serde(default)]
+    still_px: u64,
 }
 
 #[derive(Serialize)]
@@ -306,6 +309,7 @@ impl StatsFile {
             n_detected: stats.n_detected,
             background: BackgroundStats {
                 never_seen_px: stats.never_seen_px,
+                still_px: stats.still_px,
             },
             several_animals: stats.several_animals,
             n_foreign_frames: stats.n_foreign_frames,
@@ -328,6 +332,7 @@ impl StatsFile {
             n_frames: self.n_frames,
             n_detected: self.n_detected,
             never_seen_px: self.background.never_seen_px,
+            still_px: self.background.still_px,
             several_animals: self.several_animals,
             n_foreign_frames: self.n_foreign_frames,
             first_foreign_s: self.first_foreign_s,

@@ -96,6 +96,9 @@ pub struct LibraryStats {
     /// them (Efros & Leung 1999), starting at the edge; beyond 16384 pixels the rest is interpolated
     /// smoothly.
     pub never_seen_px: u64,
+    /// Number of background pixels in which a part of the animal rested so long that it was taken for background
+    /// at first.
+    pub still_px: u64,
     /// Whether several animals move in the footage and the largest was followed, as requested.
     pub several_animals: bool,
     /// Number of frames that show another scene (black frames, title cards). They are not measured.

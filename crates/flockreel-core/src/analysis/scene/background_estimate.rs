@@ -9,6 +9,7 @@ use super::occupancy::Occupancy;
 use super::resting;
 use super::samples::Samples;
 use super::states::{self, SampleGroup};
+use super::still_part::StillPart;
 use super::survey::Survey;
 use super::sway;
 use super::thumbnail::Thumbnail;
@@ -40,6 +41,8 @@ pub(super) struct BackgroundEstimate {
     pub(super) background_of: Vec<Option<usize>>,
     /// The parameter `threshold`: least difference that counts, levels of 255.
     threshold: u8,
+    /// Parts of the animal that never leave their place.
+    pub(super) still_parts: Vec<StillPart>,
 }
 
 impl BackgroundEstimate {
@@ -116,6 +119,7 @@ impl BackgroundEstimate {
             groups,
             backgrounds,
             threshold,
+            still_parts: Vec::new(),
         }
     }
 
@@ -201,7 +205,11 @@ impl BackgroundEstimate {
 
     /// Returns the samples in which each pixel shows the scene.
     pub(super) fn occupancy(&self, samples: &Samples, survey: &Survey) -> Occupancy {
-        Occupancy::new(samples, &self.of_samples(), survey)
+        let mut occupancy = Occupancy::new(samples, &self.of_samples(), survey);
+        for part in &self.still_parts {
+            occupancy.mark_hidden(part);
+        }
+        occupancy
     }
 
     /// Returns the samples in which each pixel shows the scene. It combines the survey of short windows with

@@ -31,6 +31,7 @@ mod resting;
 mod samples;
 mod scenery;
 mod states;
+mod still_part;
 mod survey;
 mod sway;
 mod thumbnail;
@@ -47,6 +48,12 @@ use survey::Survey;
 /// Largest share of blocks that may differ where a frame shows a background's scene, 0..=1. Free choice.
 const MAX_DIFFERING_SHARE: f64 = 0.5;
 
+/// Number of times that still parts of the animal are taken out of the backgrounds. Free choice: it bounds the
+/// time.
+const MAX_REPAIRS: usize = 3;
+/// Least area of the first still part as a share of the animal's; a smaller one changes little. Free choice.
+const MIN_STILL_SHARE: f64 = 0.3;
+
 /// The scene of a footage.
 pub struct Scene {
     /// The backgrounds, the one with the most samples first.
@@ -61,6 +68,9 @@ pub struct Scene {
     pub tether_px: Option<u32>,
     /// Whether several animals move.
     pub several_animals: bool,
+    /// Number of pixels of the backgrounds that showed a part of the animal which never left its place, until they
+    /// were filled.
+    pub still_px: u64,
     /// The mirror that shows the animal's image; `None` without one.
     pub mirror: Option<Mirror>,
     /// Whether every frame comes with a mask of the animal.
@@ -90,6 +100,11 @@ impl Scene {
         let survey = Survey::new(samples, &estimate.of_samples());
         let frames = samples.frame_idx.iter().copied();
         Ok(Scene {
+            still_px: estimate
+                .still_parts
+                .iter()
+                .map(|part| part.pixels.area() as u64)
+                .sum(),
             backgrounds: estimate.backgrounds,
             samples: frames.zip(estimate.background_of).collect(),
             subject: survey.subject.ok_or(Error::NothingMoves)?,
@@ -183,10 +198,46 @@ pub fn estimate(
         estimate.repaint(&samples, &occupancy, given.is_some());
         survey = estimate.survey(&samples);
     }
+    if given.is_none() {
+        survey = uncover_still_parts(&mut estimate, &samples, survey);
+    }
     let similar_objects = refusal::check(&survey, &samples, params)?;
     let occupancy = estimate.occupancy(&samples, &survey);
     estimate.finish(&samples, &occupancy, &survey, given.is_some());
     Scene::new(estimate, &samples, similar_objects)
+}
+
+/// Takes parts of the animal that never leave their place out of the backgrounds. Each repair shows more of the
+/// animal, and so may show further parts. Returns the survey afterward.
+fn uncover_still_parts(
+    estimate: &mut BackgroundEstimate,
+    samples: &Samples,
+    mut survey: Survey,
+) -> Survey {
+    for repair in 0..MAX_REPAIRS {
+        let evidence = still_part::find(
+            samples,
+            &estimate.backgrounds,
+            &estimate.background_of,
+            &survey,
+        );
+        let animal_px = survey.subject.as_ref().map_or(0.0, Subject::area_px);
+        let largest_px = evidence
+            .parts
+            .iter()
+            .map(|part| part.area_px)
+            .fold(0.0, f64::max);
+        if largest_px == 0.0 || (repair == 0 && largest_px < MIN_STILL_SHARE * animal_px) {
+            break;
+        }
+        estimate.still_parts.extend(evidence.parts);
+        for _ in 0..2 {
+            let occupancy = estimate.occupancy(samples, &survey);
+            estimate.repaint(samples, &occupancy, false);
+            survey = estimate.survey(samples);
+        }
+    }
+    survey
 }
 
 /// Estimates the scene of footage with masks of the animal. Movement, dimming and flicker of the scene are no

@@ -5,6 +5,7 @@
 
 use super::background::Background;
 use super::samples::Samples;
+use super::still_part::StillPart;
 use super::survey::{MIN_GHOST_SAMPLES, Survey};
 use super::sway;
 use crate::raster::runs::Component;
@@ -81,6 +82,17 @@ impl Occupancy {
         let mask = component.mask(component.rect.inflated(MARGIN_PX, width, height));
         let mask = mask.dilated_by(MARGIN_PX);
         pixels_of(&mask, width).for_each(|px| self.taken[px] |= samples);
+    }
+
+    /// Marks the pixels of a still part of the animal as taken in the samples that show it, and only in these.
+    pub(super) fn mark_hidden(&mut self, part: &StillPart) {
+        let pixels = self.taken.iter_mut().zip(&mut self.ghost);
+        for ((taken, ghost), bit) in pixels.zip(&part.pixels.bits) {
+            if *bit == 1 {
+                *taken = part.samples;
+                *ghost = 0;
+            }
+        }
     }
 
     /// Returns for each square cell of the picture the samples in which something covers any of its pixels.

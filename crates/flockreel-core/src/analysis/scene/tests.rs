@@ -258,3 +258,67 @@ fn film_of_a_few_frames_is_refused() {
         "the footage has 12 frames to measure, but at least 16 are needed"
     );
 }
+
+/// Returns a fish that holds its place: a body of discs that never moves, and a tail that beats.
+fn station_holder(frame_idx: usize) -> Vec<Disc> {
+    let sway = libm::sin(0.7 * frame_idx as f64);
+    let along = |at: usize| {
+        let behind = at.saturating_sub(8) as f64;
+        Disc {
+            center_px: [50.0 + 4.0 * at as f64, 72.0 + 0.35 * behind * behind * sway],
+            radius_px: 9.0 - 0.4 * at as f64,
+        }
+    };
+    (0..17).map(along).collect()
+}
+
+/// Returns the number of pixels inside discs, and the mean of their centers.
+fn covered(discs: &[Disc]) -> (f64, [f64; 2]) {
+    let (mut n, mut sum) = (0.0, [0.0; 2]);
+    for at in 0..WIDTH * HEIGHT {
+        let [x, y] = [at % WIDTH, at / WIDTH].map(|v| f64::from(v) + 0.5);
+        let inside = |d: &Disc| libm::hypot(x - d.center_px[0], y - d.center_px[1]) < d.radius_px;
+        if discs.iter().any(inside) {
+            n += 1.0;
+            sum = [sum[0] + x, sum[1] + y];
+        }
+    }
+    (n, sum.map(|v| v / n))
+}
+
+#[test]
+fn animal_that_never_leaves_its_place_is_seen_whole() {
+    let library = analyzed(60, &Params::default(), |k| {
+        Picture::with_discs(station_holder(k))
+    });
+    let library = library.expect("the tail moves");
+    for (k, pose) in library.poses.frames.iter().enumerate() {
+        let (area_px, [x, y]) = covered(&station_holder(k));
+        let found = pose.centroid_px.expect("the animal is found");
+        let off_px = libm::hypot(found[0] - x, found[1] - y);
+        let share = pose.area_px.expect("it has an area") / area_px;
+        assert!(
+            off_px < 3.0 && (0.9..1.1).contains(&share),
+            "frame {k}: {off_px} px, {share}"
+        );
+        assert!(
+            pose.confidence < Some(0.9),
+            "the floor under the body is invented"
+        );
+    }
+    let advice = crate::analysis::stats::advice(&library, &Params::default());
+    assert!(advice.iter().any(|one| one.code() == "never_leaves"));
+}
+
+#[test]
+fn thing_of_the_animals_color_is_no_part_of_it() {
+    let rock = Disc {
+        center_px: [96.0, 117.0],
+        radius_px: 14.0,
+    };
+    let library = analyzed(60, &Params::default(), |k| {
+        Picture::with_discs(vec![swimmer(k, 0.0, 9.0), rock])
+    });
+    let library = library.expect("one animal swims");
+    assert_eq!(library.stats.still_px, 0);
+}

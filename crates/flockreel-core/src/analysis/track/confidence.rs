@@ -12,6 +12,15 @@ pub(super) const FOUND: f64 = 0.5;
 /// Log-odds at misfit 0. Measured on 150 films of bench/cases.py: one frame in 150 is wrong.
 const BASE: f64 = 5.0;
 
+/// Probability that the measured animal is the whole one although a part of it never left its place. Free choice:
+/// below 0.9, so that no such measurement counts as sure.
+const WITH_STILL_PART: f64 = 0.88;
+
+/// Returns the probability that the measured animal is the whole one, 0..=1.
+pub(super) fn that_whole(has_still_part: bool) -> f64 {
+    if has_still_part { WITH_STILL_PART } else { 1.0 }
+}
+
 /// Returns the probability that a candidate of this misfit is right, 0..=1: one half at a misfit of `FITS`.
 pub(super) fn from_misfit(misfit: f64) -> f64 {
     1.0 / (1.0 + libm::exp(BASE * (misfit / FITS - 1.0)))

@@ -139,8 +139,11 @@ pub fn follow(
     });
     let times_s: Vec<f64> = results.iter().map(|r| r.time_s).collect();
     let movers = movers::gather(&movers.collect::<Vec<_>>(), &times_s);
+    let is_whole = confidence::that_whole(scene.still_px > 0);
     let tracked = results.into_iter().zip(chosen);
-    let tracked = tracked.map(|(result, chosen)| result.with_chosen(chosen));
+    let tracked = tracked.map(|(result, chosen)| {
+        result.with_chosen(chosen.map(|(at, confidence)| (at, is_whole * confidence)))
+    });
     let frames: Vec<Tracked> = tracked.collect();
     if frames.iter().all(|t| t.sighting.is_none()) {
         return Err(Error::NothingMoves);

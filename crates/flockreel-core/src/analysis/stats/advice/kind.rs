@@ -14,6 +14,13 @@ pub enum Advice {
     /// Several animals move. The largest was followed.
     #[error("several animals move in the film, and the largest was followed: film a single animal")]
     SeveralAnimals,
+    /// A part of the animal never left its place. The floor under it is not known, and neither is whether
+    /// more of the animal never moved.
+    #[error(
+        "a part of the animal never leaves its place, so the floor under it was filled in: check that the \
+         whole animal is measured, film until it has left, or give a picture of the empty scene as background"
+    )]
+    NeverLeaves,
     /// Other objects move.
     #[error("{}", movers_sentence(*n, longest))]
     OtherMovers {
@@ -129,6 +136,7 @@ impl Advice {
         match self {
             Advice::AnimalTooSmall => "animal_too_small",
             Advice::SeveralAnimals => "several_animals",
+            Advice::NeverLeaves => "never_leaves",
             Advice::OtherMovers { .. } => "other_movers",
             Advice::ForeignFrames { .. } => "foreign_frames",
             Advice::ViewUnsure { .. } => "view_unsure",

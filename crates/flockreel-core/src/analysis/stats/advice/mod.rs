@@ -41,6 +41,9 @@ pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
     if stats.several_animals {
         all.push(Advice::SeveralAnimals);
     }
+    if stats.still_px > 0 {
+        all.push(Advice::NeverLeaves);
+    }
     add_scene_advice(library, &mut all);
     let found = stats.n_detected as f64 / stats.n_frames.max(1) as f64;
     if found < 0.8 {
