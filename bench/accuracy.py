@@ -11,7 +11,8 @@ Films are kept in the folder, by default target/accuracy. Writes bench/results/a
 docs/measurements.md. --against compares errors and processor time with another program on the generated films;
 it prints the ratios and stores nothing of them.
 """
-import argparse, collections, concurrent.futures, contextlib, json, math, os, pathlib, re, resource, statistics, subprocess, sys, tempfile, zipfile
+import argparse, collections, concurrent.futures, contextlib, json, math, os, pathlib, re, resource, statistics, subprocess, sys, tempfile
+import zipfile
 
 import cv2
 import numpy as np
@@ -232,26 +233,27 @@ def score_outlines(run, outlines):
     most = max(map(len, by_frame.values()))
     one_each = [overlaps(mattes, {frame: masks[n] for frame, masks in by_frame.items() if n < len(masks)}) for n in range(most)]
     ious = {frame: max(one[frame] for one in one_each if frame in one) for frame in by_frame}
-    shapes = [shape_of(matte) for _, _, _, matte in mattes if matte.any()]
+    shapes = [shape_of(matte) for _, _, _, matte in mattes if matte.any()] or [(0, 0)]
     return {"iou": statistics.median(ious.values()), "ious": ious,
-            "second_pieces": statistics.mean(second > .02 for second, _ in shapes) if shapes else None,
-            "compactness": statistics.median(compact for _, compact in shapes) if shapes else None}
+            "second_pieces": statistics.mean(second > .02 for second, _ in shapes),
+            "compactness": statistics.median(compact for _, compact in shapes)}
 
 
 def recording(program, footage, stem):
     """Returns the scores of a clip against its labels and its outlines, as far as it has them."""
-    files = {key: HERE / "labels" / folder / f"{stem}.json" for key, folder in (("labels", ""), ("outlines", "outlines"))}
+    files = {"labels": HERE / "labels" / f"{stem}.json", "outlines": HERE / "labels" / "outlines" / f"{stem}.json"}
     known = {key: json.loads(file.read_text()) for key, file in files.items() if file.exists()}
-    film, always, scores = footage / next(iter(known.values()))["clip"], ("--set", "sprites=always"), {}
-    with analyzed(program, film, *always) as run:
-        for key, score in (("labels", lambda: score_labels(run.poses, known["labels"])), ("outlines", lambda: score_outlines(run, known["outlines"]))):
-            if key in known:
-                scores[key] = {"refused": run.refused} if run.refused else score()
-    # The better fitting animal of several can be told only if one is followed.
-    if scores.get("outlines", {}).get("refused") == "several_animals":
-        with analyzed(program, film, *always, "--follow-largest") as run:
-            scores["outlines"] = {"refused": run.refused} if run.refused else score_outlines(run, known["outlines"])
-    return scores
+    score_of = {"labels": lambda run, labels: score_labels(run.poses, labels), "outlines": score_outlines}
+    film = footage / next(iter(known.values()))["clip"]
+
+    def scores(keys, *flags):
+        with analyzed(program, film, "--set", "sprites=always", *flags) as run:
+            return {key: {"refused": run.refused} if run.refused else score_of[key](run, known[key]) for key in keys}
+
+    first = scores(known)
+    # Mattes of several animals exist only if one of them is followed.
+    several = first.get("outlines") == {"refused": "several_animals"}
+    return {**first, **(scores(["outlines"], "--follow-largest") if several else {})}
 
 
 def generated(program, generator, folder):
@@ -320,17 +322,21 @@ def bars(results):
     for name in ("confidence", "head_confidence"):
         ece, worst = results[name]["ece"], results[name]["worst_bin"]
         rows.append((f"films: mean calibration error of `{name}`", f"{ece:.4f}", "< 0.03", ece < .03))
-        rows.append((f"films: largest calibration error of `{name}` in a bin of at least 200 frames", f"{worst:.3f}", "<= 0.1", worst <= .1))
+        rows.append((f"films: largest calibration error of `{name}` in a bin of at least 200 frames", f"{worst:.3f}", "<= 0.1",
+                     worst <= .1))
         kind, ece = max(results[name]["kinds"].items(), key=lambda item: item[1])
         rows.append((f"films: calibration error of `{name}` in the worst kind of films, `{kind}`", f"{ece:.4f}", "< 0.05", ece < .05))
     silent = sum(score["silently_wrong"] for score in measured)
-    rows.append(("films: silently wrong (over 3% of the frames with `confidence` above 0.9 and an error over 0.25 BL)", str(silent), "0", silent == 0))
+    rows.append(("films: silently wrong (over 3% of the frames with `confidence` above 0.9 and an error over 0.25 BL)", str(silent), "0",
+                 silent == 0))
     unlike = sum(not score["as_expected"] for score in cases)
     rows.append(("films: neither measured nor refused as expected", str(unlike), "0", unlike == 0))
     leaps = sum(score["leaps"] for score in measured) / sum(score["n_steps"] for score in measured)
-    rows.append(("films: share of steps between frames that are longer than 1 BL, with `confidence` above 0.5", f"{leaps:.3%}", "< 0.1%", leaps < .001))
+    rows.append(("films: share of false steps over 1 BL between frames, with `confidence` above 0.5", f"{leaps:.3%}", "< 0.1%",
+                 leaps < .001))
     iou = min(score["iou"] for score in measured if "iou" in score)
-    rows.append(("films: intersection over union of matte and animal, median over frames, lowest of all films", f"{iou:.3f}", "> 0.9", iou > .9))
+    rows.append(("films: intersection over union of matte and animal, median over frames, lowest of all films", f"{iou:.3f}", "> 0.9",
+                 iou > .9))
     clips = {name: clip for name, clip in results.get("labels", {}).items() if "refused" not in clip}
     if clips:
         least = min(clip["found"] / clip["n"] for clip in clips.values())
@@ -350,8 +356,8 @@ def bars(results):
         ious = {name: clip["iou"] for name, clip in outlines.items() if (name in THIN) == is_thin}
         if ious:
             worst = min(ious, key=ious.get)
-            rows.append((f"recordings{which}: intersection over union of matte and outline by hand, median over frames, lowest of all clips, "
-                         f"`{worst}`", f"{ious[worst]:.3f}", f"> {least}", ious[worst] > least))
+            rows.append((f"recordings{which}: intersection over union of matte and outline by hand, median over frames, lowest of all "
+                         f"clips, `{worst}`", f"{ious[worst]:.3f}", f"> {least}", ious[worst] > least))
     bedding = outlines.get("mouse_homecage_bedding")
     if bedding:
         rows.append(("clip mouse_homecage_bedding: share of mattes with a second piece over 2% of the largest",
@@ -392,17 +398,20 @@ def case_tables(results):
     mark = lambda name, s: name if s["as_expected"] else f"{name} *"
     rows = [(mark(name, s), f"refused: `{s['refused']}`") if "refused" in s else
             (mark(name, s), f"{s['found']:.1%}", f"{s['off_p50']:.3f}", f"{s['off_p95']:.3f}", f"{s['right']:.1%}", s["far"], s["invented"],
-             f"{s['flips']} of {s['n_aside']}", s["leaps"], f"{s['iou']:.3f}" if "iou" in s else "") for name, s in results["cases"].items()]
+             f"{s['flips']} of {s['n_aside']}", s["leaps"], f"{s['iou']:.3f}" if "iou" in s else "")
+            for name, s in results["cases"].items()]
     yield from ("", "### Films with faults", "")
     yield ("`bench/cases.py` makes films of a synthetic fish with typical faults, each in three strengths and with three seeds. The number "
            "in a name is the seed. Films without a fault are also stored in other file formats: `pictures` (PNG, or TIFF with 16 bits), "
-           "`exif_turned` (JPEG), `raw` (bare H.264), `sound` (WMV), `old` (MPEG-1), `thumbnail_first`, `moving_pictures` and `unfinished_recording`. "
-           "The films from `plain-1` on have no fault added. *Over 0.25* and *false detections* (in frames "
+           "`exif_turned` (JPEG), `raw` (bare H.264), `sound` (WMV), `old` (MPEG-1), `thumbnail_first`, `moving_pictures` and "
+           "`unfinished_recording`. The films from `plain-1` on have no fault added. *Over 0.25* and *false detections* (in frames "
            "without the animal) are numbers of frames. Wrong heads are counted where "
            "the animal points less than 60 degrees out of the picture plane. Leaps are steps over 1 BL between frames. The overlap is the "
-           "intersection over union of the matte and the true animal. A star marks a film that is not measured or refused as its truth expects.")
+           "intersection over union of the matte and the true animal. A star marks a film that is neither measured nor refused as "
+           "its truth expects.")
     yield ""
-    yield from table(["film", "found", "error, median", "error, p95", "within 0.1", "over 0.25", "false detections", "wrong heads", "leaps", "overlap"], rows)
+    yield from table(["film", "found", "error, median", "error, p95", "within 0.1", "over 0.25", "false detections", "wrong heads", "leaps",
+                      "overlap"], rows)
     yield from ("", "### Calibration", "")
     yield ("Each row has the frames of the films above with similar confidence. The columns *mean* and *right* should be equal. `confidence` is right if "
            "the error is at most 0.1 BL, `head_confidence` if the head is at the right end. Each film has the same weight.")
@@ -412,7 +421,8 @@ def case_tables(results):
             (f"{row['confidence']:.3f}", f"{row['right']:.3f}", f"{row['share']:.1%}", row["frames"]) for row in results[name]["bins"]])
     yield from ("", "Mean calibration error of each kind of films:", "")
     yield from table(["kind", "`confidence`", "`head_confidence`"], [
-        (kind, f"{ece:.4f}", f"{results['head_confidence']['kinds'].get(kind, 0):.4f}") for kind, ece in results["confidence"]["kinds"].items()])
+        (kind, f"{ece:.4f}", f"{results['head_confidence']['kinds'].get(kind, 0):.4f}")
+        for kind, ece in results["confidence"]["kinds"].items()])
 
 
 def label_table(labels):
@@ -425,12 +435,12 @@ def label_table(labels):
 
 
 def outline_table(outlines):
-    rows = [(name, f"refused: `{c['refused']}`") if "refused" in c else
-            (name, f"{c['iou']:.3f}", f"{min(c['ious'].values()):.3f}", f"{c['second_pieces']:.1%}" if c["second_pieces"] is not None else "none",
-             f"{c['compactness']:.2f}" if c["compactness"] is not None else "") for name, c in outlines.items()]
-    return ["", "### Outlines", "", "Ten frames of each clip have outlines drawn by hand (`bench/labels/outlines`). The overlap is the intersection "
-            "over union of outline and matte. The last two columns are of all mattes: the share with a second piece over 2% of the largest, and "
-            "outline squared / (4 pi area). Of clips with several animals, the largest is followed.", "",
+    rows = [(name, f"refused: `{clip['refused']}`") if "refused" in clip else
+            (name, f"{clip['iou']:.3f}", f"{min(clip['ious'].values()):.3f}", f"{clip['second_pieces']:.1%}", f"{clip['compactness']:.2f}")
+            for name, clip in outlines.items()]
+    return ["", "### Outlines", "", "Ten frames of each clip have outlines drawn by hand (`bench/labels/outlines`). The overlap is the "
+            "intersection over union of outline and matte. The last columns are of all mattes: the share with a second piece over 2% of "
+            "the largest, and outline squared / (4 pi area). Of several animals, the largest is followed.", "",
             *table(["clip", "overlap, median", "lowest", "second pieces", "compactness, median"], rows)]
 
 
