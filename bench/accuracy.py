@@ -104,12 +104,15 @@ def overlaps(mattes, masks):
 
 
 def shape_of(matte):
-    """Returns the area of the second largest piece over that of the largest, and the compactness: 1 for a disk."""
+    """Returns the area of the second largest piece over that of the largest, and outline squared / (4 pi area).
+
+    The outline goes from pixel to pixel, so the latter is 1.1 for a disk.
+    """
     matte = np.pad(matte, 1).astype(np.uint8)
     areas = sorted(cv2.connectedComponentsWithStats(matte, connectivity=8)[2][1:, cv2.CC_STAT_AREA], reverse=True)
     outlines = cv2.findContours(matte, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
     outline_px = sum(cv2.arcLength(outline, True) for outline in outlines)
-    return (areas[1] / areas[0] if len(areas) > 1 else 0), outline_px ** 2 / (4 * math.pi * sum(areas))
+    return (float(areas[1] / areas[0]) if len(areas) > 1 else 0.0), float(outline_px ** 2 / (4 * math.pi * sum(areas)))
 
 
 def score_case(poses, truth):
@@ -233,7 +236,7 @@ def score_outlines(run, outlines):
     most = max(map(len, by_frame.values()))
     one_each = [overlaps(mattes, {frame: masks[n] for frame, masks in by_frame.items() if n < len(masks)}) for n in range(most)]
     ious = {frame: max(one[frame] for one in one_each if frame in one) for frame in by_frame}
-    shapes = [shape_of(matte) for _, _, _, matte in mattes if matte.any()] or [(0, 0)]
+    shapes = [shape_of(matte) for _, _, _, matte in mattes if matte.any()] or [(0.0, 0.0)]
     return {"iou": statistics.median(ious.values()), "ious": ious,
             "second_pieces": statistics.mean(second > .02 for second, _ in shapes),
             "compactness": statistics.median(compact for _, compact in shapes)}
