@@ -153,7 +153,7 @@ def main():
     names = [name for rule in rules for name in rule.get("names", [rule["name"]])]
     lay_out(rules)
     program = build()
-    films = [(name, path, flags, json.loads(truth.read_text())) for name, path, truth, flags in cases.films(args.generator, args.films)
+    films = [(name, path, flags, json.loads(truth.read_text())) for name, path, truth, flags, _ in cases.films(args.generator, args.films)
              if name in CASES]
     for clip, seconds in CLIPS.items() if args.footage else []:
         labels = json.loads((HERE / "labels" / f"{clip}.json").read_text())

@@ -306,7 +306,7 @@ def main():
     parser.add_argument("--only", nargs="+", help="measure these films alone, and keep the figures of the others")
     args = parser.parse_args()
     import measurements  # not at the top, because it imports this file
-    films = [(name, path, flags) for name, path, _, flags in cases.films(args.generator, args.films) if name in GENERATED]
+    films = [(name, path, flags) for name, path, _, flags, _ in cases.films(args.generator, args.films) if name in GENERATED]
     if args.footage:
         clips = [json.loads((HERE / "labels" / f"{clip}.json").read_text())["clip"] for clip in CLIPS]
         films += [(clip, args.footage / file, []) for clip, file in zip(CLIPS, clips)]
