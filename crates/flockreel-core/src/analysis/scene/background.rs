@@ -34,6 +34,8 @@ pub struct Background {
     pub blocks: Blocks,
     /// Whether the light of frames varies over the picture.
     pub uneven_light: bool,
+    /// Brightness of the hard shadow that the animal casts, as a share of the background's; `None` without one.
+    pub cast_shadow: Option<f32>,
     /// Index of the light of the scene. Colors of backgrounds are comparable only in the same light.
     pub light: usize,
     /// Number of pixels that the animal never left free; `fill` computed them from their surroundings.
@@ -88,6 +90,7 @@ impl Background {
             sigma,
             weak_share: Threshold::usual(threshold).weak_share,
             uneven_light: false,
+            cast_shadow: None,
             light: 0,
             never_seen_px: 0,
         }

@@ -198,6 +198,14 @@ pub fn estimate(
         estimate.repaint(&samples, &occupancy, given.is_some());
         survey = estimate.survey(&samples);
     }
+    if estimate.find_cast_shadow(&samples, &survey) {
+        for _ in 0..2 {
+            survey = estimate.survey(&samples);
+            occupancy = estimate.occupancy(&samples, &survey);
+            estimate.repaint(&samples, &occupancy, given.is_some());
+        }
+        survey = estimate.survey(&samples);
+    }
     if given.is_none() {
         survey = uncover_still_parts(&mut estimate, &samples, survey);
     }

@@ -31,6 +31,8 @@ struct Picture {
     /// Brightness of the light as a factor; 1 is normal.
     light: f64,
     discs: Vec<Disc>,
+    /// From the discs to the hard shadows that they cast on the wall, pixels.
+    shadows_px: Option<[f64; 2]>,
 }
 
 impl Picture {
@@ -39,6 +41,7 @@ impl Picture {
             camera_px: [0.0; 2],
             light: 1.0,
             discs,
+            shadows_px: None,
         }
     }
 }
@@ -101,11 +104,19 @@ fn drawn(picture: &Picture, noise_key: u64) -> Frame {
             (at as u32 % WIDTH) as f64 + 0.5,
             (at as u32 / WIDTH) as f64 + 0.5,
         );
-        let inside = |d: &&Disc| libm::hypot(x - d.center_px[0], y - d.center_px[1]) < d.radius_px;
+        let is_disc = |x: f64, y: f64| {
+            let inside =
+                |d: &Disc| libm::hypot(x - d.center_px[0], y - d.center_px[1]) < d.radius_px;
+            picture.discs.iter().any(inside)
+        };
         let [dx, dy] = picture.camera_px;
-        let level = match picture.discs.iter().find(inside) {
-            Some(_) => 40.0,
-            None => wall(x + dx, y + dy),
+        let in_shadow = picture
+            .shadows_px
+            .is_some_and(|[dx, dy]| is_disc(x - dx, y - dy));
+        let level = match (is_disc(x, y), in_shadow) {
+            (true, _) => 40.0,
+            (false, true) => 0.5 * wall(x + dx, y + dy),
+            (false, false) => wall(x + dx, y + dy),
         };
         let noise = random::normal(8, &[noise_key, at as u64]);
         frame.planes[at] = (level * picture.light + noise).clamp(16.0, 235.0) as u8;
@@ -311,14 +322,35 @@ fn animal_that_never_leaves_its_place_is_seen_whole() {
 }
 
 #[test]
-fn thing_of_the_animals_color_is_no_part_of_it() {
+fn rock_of_the_animals_color_that_it_often_touches_is_no_part_of_it() {
     let rock = Disc {
-        center_px: [96.0, 117.0],
-        radius_px: 14.0,
+        center_px: [96.0, 115.0],
+        radius_px: 24.0,
+    };
+    let visitor = |k: usize| {
+        let [aside, above] = [0.9, 0.2].map(|rate| libm::sin(rate * k as f64));
+        Disc {
+            center_px: [96.0 + 8.0 * aside, 87.0 - 60.0 * above * above],
+            radius_px: 9.0,
+        }
     };
     let library = analyzed(60, &Params::default(), |k| {
-        Picture::with_discs(vec![swimmer(k, 0.0, 9.0), rock])
+        Picture::with_discs(vec![visitor(k), rock])
+    });
+    let library = library.expect("one animal moves");
+    assert_eq!(library.stats.still_px, 0);
+}
+
+#[test]
+fn hard_shadow_on_the_wall_is_no_part_of_the_animal() {
+    let library = analyzed(60, &Params::default(), |k| Picture {
+        shadows_px: Some([13.0, 5.0]),
+        ..Picture::with_discs(vec![swimmer(k, 0.0, 10.0)])
     });
     let library = library.expect("one animal swims");
-    assert_eq!(library.stats.still_px, 0);
+    for (k, pose) in library.poses.frames.iter().enumerate() {
+        let (found, animal) = (pose.centroid_px.unwrap(), swimmer(k, 0.0, 10.0).center_px);
+        let off_px = libm::hypot(found[0] - animal[0], found[1] - animal[1]);
+        assert!(off_px < 1.5, "frame {k}: {off_px} px");
+    }
 }

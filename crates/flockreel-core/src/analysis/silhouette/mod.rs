@@ -6,6 +6,7 @@
 //! See docs/explanation/algorithms.md, "Silhouette".
 
 pub mod blocks;
+pub mod cast_shadow;
 mod given;
 pub mod shadow;
 pub mod tether;
@@ -217,6 +218,13 @@ fn hysteresis(difference: &Difference, background: &Background) -> Vec<Component
         core.bits[k] = u8::from(level > background.core_threshold[px]);
     }
     shadow::remove(&mut weak, &core, difference, background);
+    if let Some(usual) = background.cast_shadow {
+        cast_shadow::remove(&mut weak, difference, background, usual);
+        core.bits
+            .iter_mut()
+            .zip(&weak.bits)
+            .for_each(|(core, weak)| *core &= weak);
+    }
     let has_core = |component: &Component| {
         component.runs.iter().any(|run| {
             let row = (run.y - rect.y) as usize * row_length;
