@@ -115,8 +115,7 @@ fn analyze_part(
         .then(|| stats::length_px(&poses))
         .flatten();
     let shadow = length_px.and_then(|px| shadow::measure(&track, &background.rgb, px));
-    let foreign = track.frames.iter().filter(|t| t.background_idx.is_none());
-    let foreign_times_s: Vec<f64> = foreign.map(|t| t.time_s).collect();
+    let foreign_times_s = track.foreign_times_s();
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
     let stats = LibraryStats {

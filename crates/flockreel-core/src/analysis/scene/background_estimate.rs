@@ -298,7 +298,7 @@ impl BackgroundEstimate {
                 silhouette::difference(frame, background, &Light::NEUTRAL, largest.rect);
             Some(Lump::largest(&difference, background, largest))
         };
-        let lumps: Vec<Option<Lump>> = (0..samples.frames.len()).filter_map(lump_of).collect();
+        let lumps: Vec<Lump> = (0..samples.frames.len()).filter_map(lump_of).collect();
         let usual = cast_shadow::usual_brightness(&lumps);
         let backgrounds = self.backgrounds.iter_mut();
         backgrounds.for_each(|background| background.cast_shadow = usual);

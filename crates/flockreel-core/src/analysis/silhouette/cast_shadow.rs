@@ -34,9 +34,18 @@ const MIN_STEADINESS: f64 = 3.0;
 /// Range of brightness below the usual one that still is shadow. Free choice.
 const TOLERANCE: f32 = 0.1;
 
-/// One lump of shadow in a component.
+/// The lump is seen at this number of places at least, and these are apart by this many lengths of the component: the
+/// pale tail of a resting animal keeps its distance too. Free choice.
+const MIN_PLACES: usize = 4;
+const MIN_STEP: f64 = 0.5;
+
+/// The largest lump of shadow in a component.
 pub struct Lump {
-    /// Its share of the component's area, 0..=1.
+    /// Centroid of the component, pixels.
+    place_px: [f64; 2],
+    /// Length of the component, pixels.
+    length_px: f64,
+    /// Share of the component's area, 0..=1; 0 without a lump.
     share: f64,
     /// From the rest of the component to the lump, lengths of the component.
     offset: [f64; 2],
@@ -50,42 +59,55 @@ impl Lump {
         difference: &Difference,
         background: &Background,
         component: &Component,
-    ) -> Option<Lump> {
+    ) -> Lump {
         let rect = component.rect;
         let own = component.mask(rect);
         let mut shadow = Shadow::of(difference, background, BRIGHTNESS).broad;
         (shadow.bits.iter_mut().zip(&own.bits)).for_each(|(bit, own)| *bit &= own);
-        let lump = runs::components(&shadow)
-            .into_iter()
-            .max_by_key(|lump| lump.area)?;
-        let rest_px = component.area - lump.area;
-        if rest_px == 0 {
-            return None;
+        let lumps = runs::components(&shadow).into_iter();
+        let lump = lumps
+            .max_by_key(|lump| lump.area)
+            .filter(|lump| lump.area < component.area);
+        let place_px = component.centroid_px();
+        let mut found = Lump {
+            place_px,
+            length_px: f64::from(rect.w.max(rect.h)),
+            share: 0.0,
+            offset: [0.0; 2],
+            brightness: 1.0,
+        };
+        if let Some(lump) = lump {
+            found.share = lump.area as f64 / component.area as f64;
+            // The centroid of the rest follows from those of the whole and of the lump.
+            let from_whole = [0, 1].map(|axis| lump.centroid_px()[axis] - place_px[axis]);
+            found.offset = from_whole.map(|px| px / (1.0 - found.share) / found.length_px);
+            let in_lump = lump.mask(rect);
+            let inside = (0..in_lump.bits.len()).filter(|&k| in_lump.bits[k] == 1);
+            let levels = inside.map(|k| f64::from(brightness(difference, background, k)[0]));
+            found.brightness = order::median(levels).unwrap_or(1.0);
         }
-        let [of_all, of_lump] =
-            [component, &lump].map(|part| (part.centroid_px(), part.area as f64));
-        let length_px = f64::from(rect.w.max(rect.h));
-        let offset = [0, 1].map(|axis| {
-            let rest = (of_all.0[axis] * of_all.1 - of_lump.0[axis] * of_lump.1) / rest_px as f64;
-            (of_lump.0[axis] - rest) / length_px
-        });
-        let in_lump = lump.mask(rect);
-        let inside = (0..in_lump.bits.len()).filter(|&k| in_lump.bits[k] == 1);
-        let brightness = inside.map(|k| f64::from(brightness(difference, background, k)[0]));
-        Some(Lump {
-            share: lump.area as f64 / component.area as f64,
-            offset,
-            brightness: order::median(brightness)?,
-        })
+        found
     }
 }
 
-/// Returns the brightness of the shadow that an animal casts, from the largest lumps of its components; `None`
-/// if it casts none.
-pub fn usual_brightness(lumps: &[Option<Lump>]) -> Option<f32> {
-    let clear = |lump: &&Lump| lump.share >= MIN_LUMP_SHARE;
-    let clear: Vec<&Lump> = lumps.iter().flatten().filter(clear).collect();
-    if (clear.len() as f64) < MIN_FREQUENCY * lumps.len() as f64 {
+/// Returns the brightness of the shadow that an animal casts, from the lumps of its components; `None` if it casts
+/// none.
+pub fn usual_brightness(lumps: &[Lump]) -> Option<f32> {
+    let clear: Vec<&Lump> = lumps
+        .iter()
+        .filter(|lump| lump.share >= MIN_LUMP_SHARE)
+        .collect();
+    let mut apart: Vec<&Lump> = Vec::new();
+    for lump in &clear {
+        let is_near = |other: &&Lump| {
+            let [dx, dy] = [0, 1].map(|axis| lump.place_px[axis] - other.place_px[axis]);
+            libm::hypot(dx, dy) < MIN_STEP * lump.length_px
+        };
+        if !apart.iter().any(is_near) {
+            apart.push(lump);
+        }
+    }
+    if apart.len() < MIN_PLACES || (clear.len() as f64) < MIN_FREQUENCY * lumps.len() as f64 {
         return None;
     }
     let middle = [0, 1].map(|axis| order::median(clear.iter().map(|lump| lump.offset[axis])));

@@ -71,6 +71,12 @@ pub struct Track {
 }
 
 impl Track {
+    /// Returns the times of the frames that show another scene, seconds.
+    pub fn foreign_times_s(&self) -> Vec<f64> {
+        let foreign = self.frames.iter().filter(|t| t.background_idx.is_none());
+        foreign.map(|t| t.time_s).collect()
+    }
+
     /// Reads the matte of a sighting: straight alpha, of the size of its `rect`.
     pub fn image(&self, sighting: &Sighting) -> RgbaImage {
         let mut image = RgbaImage::new(sighting.rect.w, sighting.rect.h);
