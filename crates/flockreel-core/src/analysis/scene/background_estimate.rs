@@ -5,18 +5,16 @@
 
 use super::background::{Background, Threshold};
 use super::fill;
-use super::light::Light;
 use super::occupancy::Occupancy;
 use super::resting;
 use super::samples::Samples;
+use super::states::thumbnail::Thumbnail;
 use super::states::{self, SampleGroup};
 use super::still_part::StillPart;
 use super::survey::Survey;
 use super::sway;
-use super::thumbnail::Thumbnail;
 use super::windows;
-use crate::analysis::silhouette::cast_shadow::{self, Lump};
-use crate::analysis::silhouette::{self, blocks};
+use crate::analysis::silhouette::blocks;
 use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
 use crate::raster::{Frame, RgbImage};
@@ -285,24 +283,6 @@ impl BackgroundEstimate {
         if !is_given {
             self.fill_unknown(samples, occupancy, fill::smooth);
         }
-    }
-
-    /// Looks for a hard shadow of the animal at the largest component of each sample. Returns whether there is one;
-    /// it then is part of no component.
-    pub(super) fn find_cast_shadow(&mut self, samples: &Samples, survey: &Survey) -> bool {
-        let lump_of = |k: usize| {
-            let background = &self.backgrounds[self.background_of[k]?];
-            let largest = survey.components[k].first()?;
-            let frame = &samples.frames[k];
-            let difference =
-                silhouette::difference(frame, background, &Light::NEUTRAL, largest.rect);
-            Some(Lump::largest(&difference, background, largest))
-        };
-        let lumps: Vec<Lump> = (0..samples.frames.len()).filter_map(lump_of).collect();
-        let usual = cast_shadow::usual_brightness(&lumps);
-        let backgrounds = self.backgrounds.iter_mut();
-        backgrounds.for_each(|background| background.cast_shadow = usual);
-        usual.is_some()
     }
 
     /// Synthesizes texture where no sample shows the scene, and finds the second color of swaying scenery.

@@ -34,7 +34,6 @@ mod states;
 mod still_part;
 mod survey;
 mod sway;
-mod thumbnail;
 mod windows;
 
 use background::Background;
@@ -198,7 +197,10 @@ pub fn estimate(
         estimate.repaint(&samples, &occupancy, given.is_some());
         survey = estimate.survey(&samples);
     }
-    if estimate.find_cast_shadow(&samples, &survey) {
+    let cast_shadow = survey.cast_shadow(&samples, &estimate.of_samples());
+    if cast_shadow.is_some() {
+        let backgrounds = estimate.backgrounds.iter_mut();
+        backgrounds.for_each(|background| background.cast_shadow = cast_shadow);
         for _ in 0..2 {
             survey = estimate.survey(&samples);
             occupancy = estimate.occupancy(&samples, &survey);

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::background::Background;
 use super::light;
-use super::thumbnail::Thumbnail;
+use super::states::thumbnail::Thumbnail;
 use crate::analysis::params::AnimalAtParam;
 use crate::analysis::{Error, MIN_FRAMES, Params};
 use crate::footage::{FrameSource, spread_idx};

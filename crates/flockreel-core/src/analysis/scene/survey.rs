@@ -12,6 +12,7 @@ use super::ghost;
 use super::light::Light;
 use super::samples::Samples;
 use super::scenery;
+use crate::analysis::silhouette::cast_shadow::{self, Lump};
 use crate::analysis::silhouette::{self, shadow, tether};
 use crate::analysis::subject::{Color, Look, MIN_AREA_PX, Subject, touches_border};
 use crate::order;
@@ -135,6 +136,24 @@ impl Survey {
             subject,
             animal,
         }
+    }
+
+    /// Returns the brightness of the hard shadow that the animal casts, from the largest component of each sample;
+    /// `None` without one.
+    pub(super) fn cast_shadow(
+        &self,
+        samples: &Samples,
+        backgrounds: &[Option<&Background>],
+    ) -> Option<f32> {
+        let lump_of = |k: usize| {
+            let (background, largest) = (backgrounds[k]?, self.components[k].first()?);
+            let frame = &samples.frames[k];
+            let difference =
+                silhouette::difference(frame, background, &Light::NEUTRAL, largest.rect);
+            Some(Lump::largest(&difference, background, largest))
+        };
+        let lumps: Vec<Lump> = (0..samples.frames.len()).filter_map(lump_of).collect();
+        cast_shadow::usual_brightness(&lumps)
     }
 
     /// Returns half the width below which a part is thin, pixels; `None` if few sightings show a tether. A

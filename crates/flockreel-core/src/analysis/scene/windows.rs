@@ -5,8 +5,8 @@
 //! and leaves out the cells that the animal covers. The module also cuts groups into short windows of equal size.
 
 use super::samples::indices;
+use super::states::thumbnail::Thumbnail;
 use super::states::{MIN_SAMPLES, SampleGroup};
-use super::thumbnail::Thumbnail;
 
 /// Share of differing cells below which one background is enough, 0..=1. Free choice.
 const GOOD_SHARE: f64 = 0.004;

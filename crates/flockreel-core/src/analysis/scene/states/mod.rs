@@ -7,10 +7,11 @@
 //! scene join no state: black frames, title cards, a hand over the lens.
 
 mod camera_shift;
+pub(super) mod thumbnail;
 
 use self::camera_shift::Correlator;
+use self::thumbnail::Thumbnail;
 use super::samples::{Samples, indices};
-use super::thumbnail::Thumbnail;
 use crate::analysis::Error;
 use crate::order;
 

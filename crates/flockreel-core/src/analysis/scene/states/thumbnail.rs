@@ -24,20 +24,20 @@ const MAX_GAIN: f32 = 4.0;
 
 /// Means of Y (minus black), U and V (both minus 128) in square cells, row by row.
 #[derive(Clone, Debug)]
-pub(super) struct Thumbnail {
+pub(in crate::analysis::scene) struct Thumbnail {
     columns: usize,
     cells: Vec<[f32; 3]>,
 }
 
 impl Thumbnail {
     /// Returns the side of a cell for a picture of this size, pixels; always even.
-    pub(super) fn cell_px(width: u32, height: u32) -> usize {
+    pub(in crate::analysis::scene) fn cell_px(width: u32, height: u32) -> usize {
         let side = (width.max(height) as usize).div_ceil(N_CELLS_ALONG);
         (side + side % 2).max(4)
     }
 
     /// Returns the thumbnail of a frame.
-    pub(super) fn new(frame: &Frame) -> Thumbnail {
+    pub(in crate::analysis::scene) fn new(frame: &Frame) -> Thumbnail {
         let side = Thumbnail::cell_px(frame.width, frame.height);
         let (w, h) = (frame.width as usize, frame.height as usize);
         let (columns, rows) = (w.div_ceil(side), h.div_ceil(side));
@@ -54,7 +54,9 @@ impl Thumbnail {
     }
 
     /// Returns the median of each cell over thumbnails of one size. Panics if there are none.
-    pub(super) fn median<'a>(all: impl Iterator<Item = &'a Thumbnail>) -> Thumbnail {
+    pub(in crate::analysis::scene) fn median<'a>(
+        all: impl Iterator<Item = &'a Thumbnail>,
+    ) -> Thumbnail {
         let all: Vec<&Thumbnail> = all.collect();
         let cell = |k: usize| {
             [0, 1, 2].map(|c| {
@@ -69,12 +71,12 @@ impl Thumbnail {
     }
 
     /// Returns the number of cells.
-    pub(super) fn len(&self) -> usize {
+    pub(in crate::analysis::scene) fn len(&self) -> usize {
         self.cells.len()
     }
 
     /// Returns whether the picture is blank: black, or without structure.
-    pub(super) fn is_blank(&self) -> bool {
+    pub(in crate::analysis::scene) fn is_blank(&self) -> bool {
         let luma = || self.cells.iter().map(|cell| cell[0]);
         let most = luma().fold(f32::MIN, f32::max);
         let least = luma().fold(f32::MAX, f32::min);
@@ -82,7 +84,7 @@ impl Thumbnail {
     }
 
     /// Returns the share of cells that differ from another thumbnail after its light is fitted, 0..=1.
-    pub(super) fn mismatch(&self, other: &Thumbnail) -> f64 {
+    pub(in crate::analysis::scene) fn mismatch(&self, other: &Thumbnail) -> f64 {
         let fitted = self.in_light_of(other);
         let differs = |(a, b): &(&[f32; 3], &[f32; 3])| cells_differ(a, b);
         let n = fitted
@@ -95,12 +97,12 @@ impl Thumbnail {
     }
 
     /// Returns whether cell `k` differs from that of another thumbnail, without a fit of the light.
-    pub(super) fn differs_at(&self, other: &Thumbnail, k: usize) -> bool {
+    pub(in crate::analysis::scene) fn differs_at(&self, other: &Thumbnail, k: usize) -> bool {
         cells_differ(&self.cells[k], &other.cells[k])
     }
 
     /// Returns the correlation of the luma of two thumbnails, -1..=1; 0 where one is flat.
-    pub(super) fn correlation(&self, other: &Thumbnail) -> f64 {
+    pub(in crate::analysis::scene) fn correlation(&self, other: &Thumbnail) -> f64 {
         let n = self.cells.len() as f64;
         let mean = |t: &Thumbnail| t.cells.iter().map(|c| f64::from(c[0])).sum::<f64>() / n;
         let (a, b) = (mean(self), mean(other));
