@@ -26,7 +26,7 @@ export function pictureOf(code, { desk, pictures, shoot }) {
   if (code === "foreign_frames") return shoot({ frame: desk.frameOf(facts?.stats.first_foreign_s ?? 0), label });
   if (code === "seldom_found") return shoot({ frame: frameWith((k) => !columns.detected[k]), label });
   if (code === "often_at_border") return shoot({ frame: frameWith((k) => columns.cut[k] === 1), label, hasMarks: true });
-  if (code === "animal_too_small" || code === "several_animals" || code === "mostly_rests") return shoot({ frame: frameWith((k) => columns.detected[k] === 1), label, hasMarks: true });
+  if (code === "animal_too_small" || code === "several_animals" || code === "never_leaves" || code === "mostly_rests") return shoot({ frame: frameWith((k) => columns.detected[k] === 1), label, hasMarks: true });
   return null;
 }
 
