@@ -225,22 +225,18 @@ fn uncover_still_parts(
     mut survey: Survey,
 ) -> Survey {
     for repair in 0..MAX_REPAIRS {
-        let evidence = still_part::find(
+        let parts = still_part::find(
             samples,
             &estimate.backgrounds,
             &estimate.background_of,
             &survey,
         );
         let animal_px = survey.subject.as_ref().map_or(0.0, Subject::area_px);
-        let largest_px = evidence
-            .parts
-            .iter()
-            .map(|part| part.area_px)
-            .fold(0.0, f64::max);
+        let largest_px = parts.iter().map(|part| part.area_px).fold(0.0, f64::max);
         if largest_px == 0.0 || (repair == 0 && largest_px < MIN_STILL_SHARE * animal_px) {
             break;
         }
-        estimate.still_parts.extend(evidence.parts);
+        estimate.still_parts.extend(parts);
         for _ in 0..2 {
             let occupancy = estimate.occupancy(samples, &survey);
             estimate.repaint(samples, &occupancy, false);

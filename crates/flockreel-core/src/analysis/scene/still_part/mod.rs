@@ -20,7 +20,6 @@ use self::marks::Marks;
 use super::background::Background;
 use super::samples::Samples;
 use super::survey::Survey;
-use crate::order;
 use crate::raster::Mask;
 use crate::raster::runs;
 
@@ -31,7 +30,7 @@ const CLUSTER_REACH: u32 = 5;
 /// Largest number of clusters that are cut. Free choice: it bounds the time.
 const MAX_CLUSTERS: usize = 4;
 /// Least share of the samples with a body in which the animal touches it, and in which it does so at one place,
-/// 0..=1. An animal in front of a piece of furniture touches it in up to 0.9, at one place in up to 0.5.
+/// 0..=1. Free choice.
 const MIN_TOUCHING_SHARE: f64 = 0.95;
 const MIN_ANCHORED_SHARE: f64 = 0.6;
 
@@ -45,45 +44,25 @@ pub(super) struct StillPart {
     pub(super) samples: u64,
 }
 
-/// What the samples show of still parts.
-pub(super) struct Evidence {
-    /// The still parts.
-    pub(super) parts: Vec<StillPart>,
-    /// Recurring ghost outline as a share of the animal's outline, the median over the samples.
-    pub(super) ghost_share: f64,
-}
-
-/// Looks for still parts of the animal in the backgrounds.
+/// Returns the still parts of the animal in the backgrounds.
 pub(super) fn find(
     samples: &Samples,
     backgrounds: &[Background],
     background_of: &[Option<usize>],
     survey: &Survey,
-) -> Evidence {
+) -> Vec<StillPart> {
     let grid = Grid::new(samples.size_px());
-    let mut evidence = Evidence {
-        parts: Vec::new(),
-        ghost_share: 0.0,
-    };
+    let mut found = Vec::new();
     let Some((marks, colors)) = marks::find(samples, backgrounds, background_of, survey, &grid)
     else {
-        return evidence;
+        return found;
     };
-    let mut ghost_shares = Vec::new();
     for (at, background) in backgrounds.iter().enumerate() {
         let own: Vec<&Marks> = marks
             .iter()
             .filter(|marks| marks.background == at)
             .collect();
         let recurring = Recurring::new(&own, &grid);
-        ghost_shares.extend(own.iter().map(|marks| {
-            let n_ghosts = marks
-                .ghosts
-                .iter()
-                .filter(|&&cell| recurring.is_ghost(cell))
-                .count();
-            n_ghosts as f64 / marks.around.len().max(1) as f64
-        }));
         let seeds = recurring.seeds(&own, &grid);
         let mut clusters = runs::components(&seeds.dilated_by(CLUSTER_REACH));
         if clusters.is_empty() {
@@ -103,10 +82,9 @@ pub(super) fn find(
                     .fold(!0, |all, m| all & !(1 << m.sample)),
                 pixels: grid.pixels(&body),
             });
-        evidence.parts.extend(parts);
+        found.extend(parts);
     }
-    evidence.ghost_share = order::median(ghost_shares.into_iter()).unwrap_or(0.0);
-    evidence
+    found
 }
 
 /// How often marks recur in each cell.
