@@ -13,9 +13,12 @@ use rayon::prelude::*;
 pub mod asymmetry;
 mod body;
 mod confidence;
+mod identity;
+mod motion;
 mod movers;
 mod path;
 pub mod sighting;
+mod stretch;
 
 use self::movers::MoverSighting;
 use self::path::Candidate;
@@ -33,8 +36,8 @@ use crate::raster::runs::Component;
 use crate::raster::{Frame, RgbaImage};
 use crate::scratch::{Full, Scratch};
 
-/// Greatest number of candidates per frame. Free choice.
-const MAX_CANDIDATES: usize = 3;
+/// Greatest number of candidates per frame. Free choice: it bounds the memory.
+const MAX_CANDIDATES: usize = 16;
 /// One frame in this many keeps the animal's surroundings. Free choice: it bounds the memory.
 const SURROUNDINGS_EVERY: usize = 8;
 /// Least area of a reported mover, as a share of the animal's median area. Free choice.

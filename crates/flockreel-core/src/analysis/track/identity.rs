@@ -1,0 +1,116 @@
+//! Which stretches show the same animal: the probability of each to continue each earlier one.
+//!
+//! Every stretch continues at most one and is continued by at most one. The marginal probabilities of all such
+//! pairings are computed by belief propagation (Williams & Lau 2014, "Approximate evaluation of marginal association
+//! probabilities with belief propagation"). Where two alike bodies meet and part, each continuation has about one
+//! half. A leap to a body that has a better origin has about none.
+
+use super::motion::Motion;
+use super::stretch::Stretch;
+
+/// Number of later stretches that may continue one. Free choice: it bounds the memory.
+const N_NEXT: usize = 64;
+/// Rounds of belief propagation. Free choice: more change nothing.
+const N_ROUNDS: usize = 20;
+/// Least density of other bodies, per frame and square pixel; it only keeps the ratios finite.
+const LEAST_DENSITY: f64 = 1e-12;
+
+/// A stretch that may continue another.
+struct Link {
+    from: usize,
+    to: usize,
+    /// Probability, 0..=1; until it is known, the ratio of its likelihood to that of two different bodies.
+    p: f64,
+}
+
+/// The stretches that show one body each, and which of them show the same.
+pub(super) struct Identity<'a> {
+    bodies: &'a [&'a Stretch],
+    links: Vec<Link>,
+}
+
+impl<'a> Identity<'a> {
+    /// Pairs the bodies, which are ordered by first frame.
+    pub(super) fn new(bodies: &'a [&'a Stretch]) -> Identity<'a> {
+        let motion = Motion::learn(bodies);
+        let others = density_of_others(bodies);
+        let mut links = Vec::new();
+        for (from, a) in bodies.iter().enumerate() {
+            let later = bodies.partition_point(|b| b.first < a.end());
+            let next = (later..).zip(&bodies[later..]);
+            for (to, b) in next.take(N_NEXT) {
+                let p = motion.density(a, b) / others;
+                links.push(Link { from, to, p });
+            }
+        }
+        propagate(&mut links, bodies.len());
+        Identity { bodies, links }
+    }
+
+    /// Returns for each body the probability that it is the same as body `anchor`.
+    pub(super) fn same_as(&self, anchor: usize) -> Vec<f64> {
+        let mut later = vec![0.0; self.bodies.len()];
+        let mut earlier = later.clone();
+        later[anchor] = 1.0;
+        earlier[anchor] = 1.0;
+        for link in &self.links {
+            later[link.to] += link.p * later[link.from];
+        }
+        for link in self.links.iter().rev() {
+            earlier[link.from] += link.p * earlier[link.to];
+        }
+        let best = later.into_iter().zip(earlier);
+        best.map(|(a, b)| a.max(b).min(1.0)).collect()
+    }
+}
+
+/// Returns the density with which other bodies than the animal come into view, per frame and square pixel: each
+/// comes once in the film.
+fn density_of_others(bodies: &[&Stretch]) -> f64 {
+    let n_frames = bodies.iter().map(|body| body.end()).max().unwrap_or(0);
+    let mut n_in = vec![0u32; n_frames];
+    let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
+    for body in bodies {
+        body.places_px.iter().for_each(|place| {
+            for axis in 0..2 {
+                low[axis] = low[axis].min(place[axis]);
+                high[axis] = high[axis].max(place[axis]);
+            }
+        });
+        (body.first..body.end()).for_each(|t| n_in[t] += 1);
+    }
+    let n_others: u32 = n_in.iter().map(|n| n.saturating_sub(1)).sum();
+    let mean = f64::from(n_others) / n_frames.max(1) as f64;
+    let area_px = (high[0] - low[0]).max(1.0) * (high[1] - low[1]).max(1.0);
+    (mean / (n_frames.max(1) as f64 * area_px)).max(LEAST_DENSITY)
+}
+
+/// Turns the likelihood ratios of the links into probabilities.
+///
+/// Each link carries two messages: how much its start asks for its end, given the other ends, and how free its end
+/// is, given the other starts.
+fn propagate(links: &mut [Link], n_bodies: usize) {
+    let mut asked = vec![0.0; links.len()];
+    let mut free = vec![1.0; links.len()];
+    for _ in 0..N_ROUNDS {
+        let mut of_start = vec![0.0; n_bodies];
+        let mut of_end = vec![0.0; n_bodies];
+        for (link, free) in links.iter().zip(&free) {
+            of_start[link.from] += link.p * free;
+        }
+        for ((link, free), asked) in links.iter().zip(&free).zip(&mut asked) {
+            *asked = link.p / (1.0 + (of_start[link.from] - link.p * free).max(0.0));
+            of_end[link.to] += *asked;
+        }
+        for ((link, free), asked) in links.iter().zip(&mut free).zip(&asked) {
+            *free = 1.0 / (1.0 + (of_end[link.to] - asked).max(0.0));
+        }
+    }
+    let mut of_start = vec![0.0; n_bodies];
+    for (link, free) in links.iter().zip(&free) {
+        of_start[link.from] += link.p * free;
+    }
+    for (link, free) in links.iter_mut().zip(&free) {
+        link.p *= free / (1.0 + of_start[link.from]);
+    }
+}

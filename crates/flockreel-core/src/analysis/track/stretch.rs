@@ -1,0 +1,196 @@
+//! Divides the candidates of a film into stretches: one body each, followed through successive frames.
+//!
+//! Two candidates of successive frames are linked if each is the nearest to the other, and nothing else could be
+//! meant. A stretch also ends where two bodies touch and become one component, and where this component divides.
+//! The stretch in between shows a group. See docs/explanation/algorithms.md, "Tracking".
+
+use super::path::Candidate;
+use crate::analysis::subject::{FITS, Subject};
+use crate::geometry::Rect;
+use crate::order;
+
+/// Greatest change of log area between successive frames of one body. Free choice.
+const MAX_AREA_CHANGE: f64 = 0.6;
+/// Another candidate may be meant unless it is farther away than the nearest one by this factor. Free choice.
+const FARTHER_FACTOR: f64 = 3.0;
+
+/// One body in successive frames.
+pub(super) struct Stretch {
+    /// Index of its first frame.
+    pub(super) first: usize,
+    /// Index of its candidate in each frame from `first` on.
+    pub(super) candidates: Vec<usize>,
+    /// Centroid in each frame, pixels.
+    pub(super) places_px: Vec<[f64; 2]>,
+    /// Natural logarithm of the area in each frame.
+    pub(super) log_areas: Vec<f64>,
+    /// Their median.
+    pub(super) log_area: f64,
+    /// Median misfit to the subject.
+    pub(super) misfit: f64,
+    /// Number of bodies that it shows; more than one where they touch.
+    pub(super) n_bodies: usize,
+}
+
+impl Stretch {
+    /// Returns the index of the frame after the last one.
+    pub(super) fn end(&self) -> usize {
+        self.first + self.candidates.len()
+    }
+
+    /// Returns whether a candidate, given by its frame and its index there, belongs to the stretch.
+    pub(super) fn has(&self, (frame_idx, at): (usize, usize)) -> bool {
+        let k = frame_idx.checked_sub(self.first);
+        k.and_then(|k| self.candidates.get(k)) == Some(&at)
+    }
+}
+
+/// Returns the stretches by first frame; each candidate belongs to one.
+pub(super) fn divide(frames: &[&[Candidate]], subject: &Subject) -> Vec<Stretch> {
+    let reach_px = subject.diagonal_px + usual_step_px(frames);
+    let fitting = frames
+        .iter()
+        .copied()
+        .flatten()
+        .filter(|candidate| candidate.cost < FITS);
+    let area_px = order::median(fitting.map(|candidate| candidate.look.area_px)).unwrap_or(1.0);
+    let mut done: Vec<Stretch> = Vec::new();
+    let mut open: Vec<Stretch> = Vec::new();
+    for (t, &candidates) in frames.iter().enumerate() {
+        let before = t.checked_sub(1).map_or(&[][..], |before| frames[before]);
+        let mut earlier: Vec<Option<Stretch>> = open.into_iter().map(Some).collect();
+        let mut n_bodies = vec![1; candidates.len()];
+        let mut is_new = vec![false; candidates.len()];
+        for (whole, stretch) in before.iter().zip(earlier.iter_mut().flatten()) {
+            let parts = parts_of(whole, candidates, before, area_px);
+            stretch.n_bodies = stretch.n_bodies.max(parts.len());
+            for &part in &parts {
+                let areas = parts.iter().map(|&part| candidates[part].look.area_px);
+                let share = candidates[part].look.area_px / areas.sum::<f64>();
+                n_bodies[part] = ((share * stretch.n_bodies as f64).round() as usize).max(1);
+                is_new[part] = true;
+            }
+        }
+        for (at, whole) in candidates.iter().enumerate() {
+            let parts = parts_of(whole, before, candidates, area_px);
+            if !parts.is_empty() {
+                let in_part = |part: usize| earlier[part].as_ref().map_or(1, |part| part.n_bodies);
+                n_bodies[at] = parts.into_iter().map(in_part).sum();
+                is_new[at] = true;
+            }
+        }
+        open = Vec::with_capacity(candidates.len());
+        for (at, candidate) in candidates.iter().enumerate() {
+            let from = partner(candidate, before, candidates, reach_px).filter(|_| !is_new[at]);
+            let known = from.and_then(|from| earlier[from].take());
+            let mut stretch = known.unwrap_or_else(|| Stretch::starting(t, n_bodies[at]));
+            stretch.add(at, candidate);
+            open.push(stretch);
+        }
+        done.extend(earlier.into_iter().flatten());
+    }
+    done.extend(open);
+    for stretch in &mut done {
+        let nodes = (stretch.first..).zip(&stretch.candidates);
+        let misfits = nodes.map(|(t, &at)| frames[t][at].cost);
+        stretch.misfit = order::median(misfits).unwrap_or(0.0);
+        stretch.log_area = order::median(stretch.log_areas.iter().copied()).unwrap_or(0.0);
+    }
+    done.sort_by_key(|stretch| stretch.first);
+    done
+}
+
+impl Stretch {
+    fn starting(first: usize, n_bodies: usize) -> Stretch {
+        Stretch {
+            first,
+            candidates: Vec::new(),
+            places_px: Vec::new(),
+            log_areas: Vec::new(),
+            log_area: 0.0,
+            misfit: 0.0,
+            n_bodies,
+        }
+    }
+
+    fn add(&mut self, at: usize, candidate: &Candidate) {
+        self.candidates.push(at);
+        self.places_px.push(candidate.look.centroid_px);
+        self.log_areas.push(libm::log(candidate.look.area_px));
+    }
+}
+
+/// Returns the 90th percentile of the distance from a fitting candidate to the nearest of the next frame, pixels.
+fn usual_step_px(frames: &[&[Candidate]]) -> f64 {
+    let steps = frames.windows(2).flat_map(|pair| {
+        let fitting = pair[0].iter().filter(|candidate| candidate.cost < FITS);
+        fitting.filter_map(|from| Some(distance_px(from, &pair[1][nearest(from, pair[1])?])))
+    });
+    order::percentile(&mut steps.collect::<Vec<f64>>(), 0.9).unwrap_or(0.0)
+}
+
+/// Returns the index of the one candidate of the frame before that `candidate` continues; `beside` holds all
+/// candidates of its own frame.
+fn partner(
+    candidate: &Candidate,
+    before: &[Candidate],
+    beside: &[Candidate],
+    reach_px: f64,
+) -> Option<usize> {
+    let from = nearest(candidate, before)?;
+    let step_px = distance_px(candidate, &before[from]);
+    let change = libm::log(candidate.look.area_px / before[from].look.area_px).abs();
+    // A second candidate within the factor would make the choice doubtful, from either end.
+    let doubtful = |end: &Candidate, all: &[Candidate]| {
+        let fitting = all.iter().filter(|other| other.cost < FITS);
+        let near = fitting.filter(|other| distance_px(end, other) <= FARTHER_FACTOR * step_px);
+        near.count() > 1
+    };
+    let is_sure = nearest(&before[from], beside)
+        .is_some_and(|back| std::ptr::eq(&raw const beside[back], candidate))
+        && step_px <= reach_px
+        && change <= MAX_AREA_CHANGE
+        && !doubtful(candidate, before)
+        && !doubtful(&before[from], beside);
+    is_sure.then_some(from)
+}
+
+/// Returns the indices of the bodies of the frame before or after, `parts`, that `whole` shows as one component; empty
+/// if it shows one body.
+///
+/// They lie in its box and continue nowhere else among `beside`, the candidates of its own frame. The pieces of one
+/// body also do. But there the whole has the usual area `area_px`, and the pieces do not.
+fn parts_of(
+    whole: &Candidate,
+    parts: &[Candidate],
+    beside: &[Candidate],
+    area_px: f64,
+) -> Vec<usize> {
+    let off = |c: &Candidate| libm::log(c.look.area_px / area_px).abs();
+    let is_inside = |at: &usize| {
+        let to = nearest(&parts[*at], beside).map(|to| &raw const beside[to]);
+        contains(whole.look.box_px, parts[*at].look.centroid_px)
+            && to.is_some_and(|to| std::ptr::eq(to, whole))
+    };
+    let inside: Vec<usize> = (0..parts.len()).filter(is_inside).collect();
+    let off_parts: f64 = inside.iter().map(|&at| off(&parts[at])).sum();
+    if inside.len() > 1 && off(whole) > off_parts {
+        inside
+    } else {
+        Vec::new()
+    }
+}
+
+fn contains(rect: Rect, [x, y]: [f64; 2]) -> bool {
+    rect.contains(x.round() as u32, y.round() as u32)
+}
+
+fn nearest(from: &Candidate, all: &[Candidate]) -> Option<usize> {
+    let distance = |at: &usize| distance_px(from, &all[*at]);
+    (0..all.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
+fn distance_px(a: &Candidate, b: &Candidate) -> f64 {
+    let ([ax, ay], [bx, by]) = (a.look.centroid_px, b.look.centroid_px);
+    libm::hypot(ax - bx, ay - by)
+}
