@@ -12,8 +12,6 @@ use super::stretch::Stretch;
 const N_NEXT: usize = 64;
 /// Rounds of belief propagation. Free choice: more change nothing.
 const N_ROUNDS: usize = 20;
-/// Least density of other bodies, per frame and square pixel; it only keeps the ratios finite.
-const LEAST_DENSITY: f64 = 1e-12;
 
 /// A stretch that may continue another.
 struct Link {
@@ -65,7 +63,7 @@ impl<'a> Identity<'a> {
 }
 
 /// Returns the density with which other bodies than the animal come into view, per frame and square pixel: each
-/// comes once in the film.
+/// comes once in the film. The least value keeps ratios finite.
 fn density_of_others(bodies: &[&Stretch]) -> f64 {
     let n_frames = bodies.iter().map(|body| body.end()).max().unwrap_or(0);
     let mut n_in = vec![0u32; n_frames];
@@ -82,7 +80,7 @@ fn density_of_others(bodies: &[&Stretch]) -> f64 {
     let n_others: u32 = n_in.iter().map(|n| n.saturating_sub(1)).sum();
     let mean = f64::from(n_others) / n_frames.max(1) as f64;
     let area_px = (high[0] - low[0]).max(1.0) * (high[1] - low[1]).max(1.0);
-    (mean / (n_frames.max(1) as f64 * area_px)).max(LEAST_DENSITY)
+    (mean / (n_frames.max(1) as f64 * area_px)).max(f64::EPSILON)
 }
 
 /// Turns the likelihood ratios of the links into probabilities.

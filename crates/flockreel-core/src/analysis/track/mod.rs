@@ -21,8 +21,8 @@ pub mod sighting;
 mod stretch;
 
 use self::movers::MoverSighting;
-use self::path::Candidate;
 use self::sighting::{CandidateShape, FrameView, Sighting};
+use self::stretch::Candidate;
 use super::params::Follow;
 use super::read_ahead::Batches;
 use super::scene::{Placed, Scene};

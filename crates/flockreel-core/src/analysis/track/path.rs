@@ -6,25 +6,13 @@
 
 use super::confidence;
 use super::identity::Identity;
-use super::sighting::Sighting;
-use super::stretch::{self, Stretch};
+use super::stretch::{self, Candidate, Stretch};
 use crate::analysis::params::Follow;
-use crate::analysis::subject::{FITS, Look, Subject};
+use crate::analysis::subject::{FITS, Subject};
 use crate::order;
 
 /// Cost from which a look is never a candidate. Free choice.
 pub(super) const MAX_COST: f64 = 24.0;
-
-/// A component that may be the animal in a frame.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Candidate {
-    /// Its size, color and place.
-    pub(super) look: Look,
-    /// Its misfit to the subject: see `Subject::cost`.
-    pub(super) cost: f64,
-    /// Its matte, measured.
-    pub(super) sighting: Sighting,
-}
 
 /// Chooses a candidate, or none, for each frame, with the probability that it is the animal.
 ///
@@ -104,41 +92,11 @@ fn median_area_px(path: &[Option<(usize, f64)>], frames: &[&[Candidate]]) -> f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::subject::Color;
-    use crate::geometry::Rect;
-    use crate::raster::RgbaImage;
+    use crate::analysis::track::stretch::tests::body;
 
     /// A thing of 20 x 10 pixels at column `x` with the given misfit.
     fn candidate(x: f64, cost: f64) -> Candidate {
         body([x, 50.0], 200.0, cost)
-    }
-
-    fn body(centroid_px: [f64; 2], area_px: f64, cost: f64) -> Candidate {
-        let w = (area_px / 10.0) as u32;
-        let box_px = Rect {
-            x: (centroid_px[0] as u32).saturating_sub(w / 2),
-            y: centroid_px[1] as u32 - 5,
-            w,
-            h: 10,
-        };
-        let mut image = RgbaImage::new(w, 10);
-        image.pixels.fill(255);
-        let look = Look {
-            area_px,
-            color: Color::from_pixels(std::iter::empty()),
-            contrast: 60.0,
-            box_px,
-            centroid_px,
-            on_border: false,
-            is_shadow: false,
-            is_ghost: false,
-            light: 0,
-        };
-        Candidate {
-            sighting: Sighting::measured(box_px, &image).expect("it is opaque"),
-            look,
-            cost,
-        }
     }
 
     fn judged(frames: &[Vec<Candidate>], pin: Option<(usize, usize)>) -> Vec<Option<(usize, f64)>> {

@@ -4,8 +4,8 @@
 //! meant. A stretch also ends where two bodies touch and become one component, and where this component divides.
 //! The stretch in between shows a group. See docs/explanation/algorithms.md, "Tracking".
 
-use super::path::Candidate;
-use crate::analysis::subject::{FITS, Subject};
+use super::sighting::Sighting;
+use crate::analysis::subject::{FITS, Look, Subject};
 use crate::geometry::Rect;
 use crate::order;
 
@@ -14,7 +14,18 @@ const MAX_AREA_CHANGE: f64 = 0.6;
 /// Another candidate may be meant unless it is farther away than the nearest one by this factor. Free choice.
 const FARTHER_FACTOR: f64 = 3.0;
 
-/// One body in successive frames.
+/// A component that may be the animal in a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Candidate {
+    /// Its size, color and place.
+    pub(super) look: Look,
+    /// Its misfit to the subject: see `Subject::cost`.
+    pub(super) cost: f64,
+    /// Its matte, measured.
+    pub(super) sighting: Sighting,
+}
+
+/// The same component in successive frames.
 pub(super) struct Stretch {
     /// Index of its first frame.
     pub(super) first: usize,
@@ -193,4 +204,87 @@ fn nearest(from: &Candidate, all: &[Candidate]) -> Option<usize> {
 fn distance_px(a: &Candidate, b: &Candidate) -> f64 {
     let ([ax, ay], [bx, by]) = (a.look.centroid_px, b.look.centroid_px);
     libm::hypot(ax - bx, ay - by)
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::analysis::subject::Color;
+    use crate::raster::RgbaImage;
+
+    /// A component of ten rows with the given centroid, area and misfit.
+    pub(in crate::analysis::track) fn body(
+        centroid_px: [f64; 2],
+        area_px: f64,
+        cost: f64,
+    ) -> Candidate {
+        let w = (area_px / 10.0) as u32;
+        let box_px = Rect {
+            x: (centroid_px[0] as u32).saturating_sub(w / 2),
+            y: centroid_px[1] as u32 - 5,
+            w,
+            h: 10,
+        };
+        let mut image = RgbaImage::new(w, 10);
+        image.pixels.fill(255);
+        let look = Look {
+            area_px,
+            color: Color::from_pixels(std::iter::empty()),
+            contrast: 60.0,
+            box_px,
+            centroid_px,
+            on_border: false,
+            is_shadow: false,
+            is_ghost: false,
+            light: 0,
+        };
+        Candidate {
+            sighting: Sighting::measured(box_px, &image).expect("it is opaque"),
+            look,
+            cost,
+        }
+    }
+
+    /// Returns frame range, centroid in the first frame and number of bodies of each stretch.
+    fn divided(frames: &[Vec<Candidate>]) -> Vec<(std::ops::Range<usize>, f64, usize)> {
+        let looks = vec![vec![body([0.0, 50.0], 200.0, 0.0).look]];
+        let subject = Subject::learn(&looks, Some((0, 0))).expect("there is a look");
+        let frames: Vec<&[Candidate]> = frames.iter().map(Vec::as_slice).collect();
+        let stretches = divide(&frames, &subject).into_iter();
+        let told = stretches.map(|s| (s.first..s.end(), s.places_px[0][0], s.n_bodies));
+        told.collect()
+    }
+
+    #[test]
+    fn group_keeps_its_number_of_bodies_when_it_divides() {
+        let row = |bodies: &[(f64, f64)]| -> Vec<Candidate> {
+            let body = |&(x, area_px): &(f64, f64)| body([x, 50.0], area_px, 0.0);
+            bodies.iter().map(body).collect()
+        };
+        let alone = row(&[(100.0, 200.0), (124.0, 200.0), (148.0, 200.0)]);
+        let frames: Vec<Vec<Candidate>> = (0..80)
+            .map(|t| match t {
+                30..40 => row(&[(124.0, 600.0)]),
+                40..50 => row(&[(112.0, 400.0), (148.0, 200.0)]),
+                _ => alone.clone(),
+            })
+            .collect();
+        let groups = divided(&frames).into_iter().filter(|stretch| stretch.2 > 1);
+        let groups: Vec<_> = groups.collect();
+        assert_eq!(groups, [(30..40, 124.0, 3), (40..50, 112.0, 2)]);
+    }
+
+    #[test]
+    fn pieces_of_one_body_are_no_group() {
+        let frames: Vec<Vec<Candidate>> = (0..60)
+            .map(|t| match t {
+                20..23 => vec![
+                    body([94.0, 50.0], 100.0, 2.4),
+                    body([106.0, 50.0], 100.0, 2.4),
+                ],
+                _ => vec![body([100.0, 50.0], 200.0, 0.0)],
+            })
+            .collect();
+        assert!(divided(&frames).iter().all(|stretch| stretch.2 == 1));
+    }
 }
