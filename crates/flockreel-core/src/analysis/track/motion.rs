@@ -5,15 +5,15 @@
 use super::stretch::Stretch;
 use crate::order;
 
-/// Longest gap for which motion is learned, frames. Free choice.
-pub(super) const MAX_GAP: usize = 30;
-/// Least error of a predicted place, pixels: that of a centroid.
-const LEAST_ERROR_PX: f64 = 1.0;
+/// Longest gap over which motion is predicted, frames. Free choice.
+const MAX_GAP: usize = 30;
+/// Share of the learned errors that the usual error exceeds: animals mostly rest. Free choice.
+const USUAL: f64 = 0.9;
 
-/// Motion of a body over 1 to `MAX_GAP` frames.
+/// Motion of a body over 1 frame, 2 frames and so on, up to the longest gap that the stretches show.
 pub(super) struct Motion {
     gaps: Vec<Gap>,
-    /// Median change of the median log area between the halves of a long stretch.
+    /// Usual change of the median log area between the halves of a long stretch.
     area_change: f64,
     /// Log areas of all bodies.
     areas: Spread,
@@ -29,18 +29,16 @@ struct Spread {
 struct Gap {
     /// Share of the motion that goes on for as long again.
     persistence: f64,
-    /// Median error of the prediction, pixels.
+    /// Usual error of the prediction, pixels; at least that of a centroid, one pixel.
     error_px: f64,
+    /// Usual distance that the body goes, pixels; at least one.
+    way_px: f64,
 }
 
 impl Motion {
     /// Learns the motion from stretches that show one body each.
     pub(super) fn learn(bodies: &[&Stretch]) -> Motion {
-        let mut gaps: Vec<Gap> = Vec::with_capacity(MAX_GAP);
-        for n in 1..=MAX_GAP {
-            let last = gaps.last().copied();
-            gaps.push(Gap::learn(bodies, n, last));
-        }
+        let gaps = (1..=MAX_GAP).map_while(|n| Gap::learn(bodies, n));
         let typical = order::median(bodies.iter().map(|body| body.log_area)).unwrap_or(0.0);
         let off = bodies.iter().map(|body| (body.log_area - typical).abs());
         // The rim of a body is known to about a pixel.
@@ -58,9 +56,10 @@ impl Motion {
             let [a, b] = [a, b].map(|half| order::median(half.iter().copied()));
             Some((a? - b?).abs())
         });
-        let change = order::median(changes).unwrap_or(population.size);
+        let change =
+            order::percentile(&mut changes.collect::<Vec<f64>>(), USUAL).unwrap_or(population.size);
         Motion {
-            gaps,
+            gaps: gaps.collect(),
             area_change: change.clamp(libm::exp(-0.5 * typical), population.size),
             areas: population,
         }
@@ -84,11 +83,13 @@ impl Motion {
         alike / (std::f64::consts::TAU * gap.error_px.powi(2) * tail * tail.sqrt())
     }
 
+    /// Returns the motion over `n` frames. Beyond the longest gap, a body goes anywhere within its reach.
     fn over(&self, n: usize) -> Gap {
-        let longest = self.gaps[MAX_GAP - 1];
+        let reach = |longest: &Gap| longest.way_px * n as f64 / self.gaps.len() as f64;
         self.gaps.get(n - 1).copied().unwrap_or(Gap {
             persistence: 0.0,
-            error_px: longest.error_px * n as f64 / MAX_GAP as f64,
+            error_px: self.gaps.last().map_or(n as f64, reach),
+            way_px: 0.0,
         })
     }
 }
@@ -102,8 +103,8 @@ impl Gap {
         off(0).powi(2) + off(1).powi(2)
     }
 
-    /// Learns the motion over `n` frames. Without a stretch of that length it continues that over fewer frames.
-    fn learn(bodies: &[&Stretch], n: usize, last: Option<Gap>) -> Gap {
+    /// Learns the motion over `n` frames; returns `None` without a stretch of twice that length.
+    fn learn(bodies: &[&Stretch], n: usize) -> Option<Gap> {
         let steps = || {
             bodies.iter().flat_map(move |body| {
                 let places = body.places_px.windows(2 * n + 1);
@@ -119,25 +120,18 @@ impl Gap {
             square += back * back;
         }
         let persistence = if square > 0.0 { both / square } else { 0.0 };
-        let off = |step: [[f64; 2]; 2]| {
-            let [x, y] = step.map(|[back, ahead]| ahead - persistence * back);
-            libm::hypot(x, y)
+        let usual_px = |share: f64| {
+            let off = steps().map(|step| {
+                let [x, y] = step.map(|[back, ahead]| ahead - share * back);
+                libm::hypot(x, y).max(1.0)
+            });
+            order::percentile(&mut off.collect::<Vec<f64>>(), USUAL)
         };
-        let least_px = last.map_or(LEAST_ERROR_PX, |last| last.error_px);
-        match (order::median(steps().map(off)), last) {
-            (Some(error_px), _) => Gap {
-                persistence,
-                error_px: error_px.max(least_px),
-            },
-            (None, Some(last)) => Gap {
-                error_px: last.error_px * n as f64 / (n - 1) as f64,
-                ..last
-            },
-            (None, None) => Gap {
-                persistence: 0.0,
-                error_px: least_px,
-            },
-        }
+        Some(Gap {
+            persistence,
+            error_px: usual_px(persistence)?,
+            way_px: usual_px(0.0)?,
+        })
     }
 }
 
