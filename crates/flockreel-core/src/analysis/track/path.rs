@@ -255,4 +255,27 @@ mod tests {
                 .all(|found| found.is_some_and(|(at, _)| at == 1))
         );
     }
+
+    #[test]
+    fn another_body_is_not_taken_for_one_that_left() {
+        // The first leaves at frame 40; the other is hidden for five frames then.
+        let frames: Vec<Vec<Candidate>> = (0..80)
+            .map(|t| {
+                let first = body([100.0 + f64::from(t), 50.0], 200.0, 0.0);
+                let other = body([200.0 - f64::from(t), 120.0], 200.0, 0.0);
+                match t {
+                    0..40 => vec![first, other],
+                    45..50 => Vec::new(),
+                    _ => vec![other],
+                }
+            })
+            .collect();
+        let path = judged(&frames, Some((0, 0)));
+        assert!(
+            path[..40]
+                .iter()
+                .all(|found| found.is_some_and(|(at, _)| at == 0))
+        );
+        assert!(path[40..].iter().all(Option::is_none));
+    }
 }
