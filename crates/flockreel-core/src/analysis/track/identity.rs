@@ -34,8 +34,8 @@ impl<'a> Identity<'a> {
         let others = density_of_others(bodies);
         let mut links = Vec::new();
         for (from, a) in bodies.iter().enumerate() {
-            let later = bodies.partition_point(|b| b.first < a.end());
-            let next = (later..).zip(&bodies[later..]);
+            let later = (from + 1..).zip(&bodies[from + 1..]);
+            let next = later.filter(|(_, b)| a.may_go_on_as(b));
             for (to, b) in next.take(N_NEXT) {
                 let p = motion.density(a, b) / others;
                 links.push(Link { from, to, p });

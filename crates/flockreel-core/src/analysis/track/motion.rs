@@ -69,9 +69,14 @@ impl Motion {
     ///
     /// It has long tails: animals turn and dart. A change of area beyond the usual lowers it.
     pub(super) fn density(&self, a: &Stretch, b: &Stretch) -> f64 {
-        let n = b.first + 1 - a.end();
+        // Where both are in view, each shows a piece of the body.
+        let (left, came) = (a.end().min(b.first), b.first.max(a.end()));
+        let n = came + 1 - left;
         let gap = self.over(n);
-        let (a_px, b_px) = (&a.places_px, &b.places_px);
+        let (a_px, b_px) = (
+            &a.places_px[..left - a.first],
+            &b.places_px[came - b.first..],
+        );
         let last = a_px.len() - 1;
         // Predicts ahead from the end of `a` and back from the start of `b`, by the motion over as many frames.
         let (k, l) = (n.min(last), n.min(b_px.len() - 1));

@@ -47,14 +47,17 @@ pub(super) fn choose(
     path.unwrap_or_else(|| vec![None; frames.len()])
 }
 
-/// Returns the candidate of each frame whose stretch probably fits and shows the animal.
+/// Returns the candidate of each frame whose stretch probably fits and shows the animal; `None` where two do, each a
+/// piece of it.
 fn judged(bodies: &[&Stretch], same: &[f64], n_frames: usize) -> Vec<Option<(usize, f64)>> {
     let mut path = vec![None; n_frames];
+    let mut n_pieces = vec![0; n_frames];
     for (body, same) in bodies.iter().zip(same) {
         let confidence = same * confidence::from_misfit(body.misfit);
         if confidence >= confidence::FOUND {
-            for (frame, &at) in path[body.first..].iter_mut().zip(&body.candidates) {
-                *frame = Some((at, confidence));
+            for (t, &at) in (body.first..).zip(&body.candidates) {
+                n_pieces[t] += 1;
+                path[t] = (n_pieces[t] == 1).then_some((at, confidence));
             }
         }
     }

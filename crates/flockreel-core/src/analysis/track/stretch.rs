@@ -49,6 +49,25 @@ impl Stretch {
         self.first + self.candidates.len()
     }
 
+    /// Returns whether `next` may show the same body from some frame on.
+    ///
+    /// It starts later and ends later. A body behind a post is in view on both sides for a while: then each of the two
+    /// is a piece, and both together are nearer to the usual area of either than it is by itself.
+    pub(super) fn may_go_on_as(&self, next: &Stretch) -> bool {
+        let both = next.first..self.end();
+        let pieces = |whole: &Stretch| {
+            let off = |log_area: f64| (log_area - whole.log_area).abs();
+            let gains = both.clone().map(|t| {
+                let [a, b, own] = [self, next, whole].map(|s| s.log_areas[t - s.first]);
+                off(own) - off(libm::log(libm::exp(a) + libm::exp(b)))
+            });
+            gains.sum::<f64>() > 0.0
+        };
+        self.first < next.first
+            && self.end() < next.end()
+            && (both.is_empty() || (pieces(self) && pieces(next)))
+    }
+
     /// Returns whether a candidate, given by its frame and its index there, belongs to the stretch.
     pub(super) fn has(&self, (frame_idx, at): (usize, usize)) -> bool {
         let k = frame_idx.checked_sub(self.first);
