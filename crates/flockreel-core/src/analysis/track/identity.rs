@@ -28,10 +28,10 @@ pub(super) struct Identity<'a> {
 }
 
 impl<'a> Identity<'a> {
-    /// Pairs the bodies, which are ordered by first frame.
-    pub(super) fn new(bodies: &'a [&'a Stretch]) -> Identity<'a> {
+    /// Pairs the bodies, which are ordered by first frame. `n_others` is the usual number of others in view.
+    pub(super) fn new(bodies: &'a [&'a Stretch], n_others: usize) -> Identity<'a> {
         let motion = Motion::learn(bodies);
-        let others = density_of_others(bodies);
+        let others = density_of_others(bodies, n_others);
         let mut links = Vec::new();
         for (from, a) in bodies.iter().enumerate() {
             let later = (from + 1..).zip(&bodies[from + 1..]);
@@ -62,25 +62,20 @@ impl<'a> Identity<'a> {
     }
 }
 
-/// Returns the density with which other bodies than the animal come into view, per frame and square pixel: each
-/// comes once in the film. The least value keeps ratios finite.
-fn density_of_others(bodies: &[&Stretch]) -> f64 {
+/// Returns the density with which `n_others` other bodies come into view, per frame and square pixel: each comes once
+/// in the film. The least value keeps ratios finite.
+fn density_of_others(bodies: &[&Stretch], n_others: usize) -> f64 {
     let n_frames = bodies.iter().map(|body| body.end()).max().unwrap_or(0);
-    let mut n_in = vec![0u32; n_frames];
-    let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-    for body in bodies {
-        body.places_px.iter().for_each(|place| {
-            for axis in 0..2 {
-                low[axis] = low[axis].min(place[axis]);
-                high[axis] = high[axis].max(place[axis]);
-            }
+    let range_px = [0, 1].map(|axis| {
+        let places = bodies.iter().flat_map(|body| &body.places_px);
+        let along = places.map(|place| place[axis]);
+        let (low, high) = along.fold((f64::MAX, f64::MIN), |(low, high), at| {
+            (low.min(at), high.max(at))
         });
-        (body.first..body.end()).for_each(|t| n_in[t] += 1);
-    }
-    let n_others: u32 = n_in.iter().map(|n| n.saturating_sub(1)).sum();
-    let mean = f64::from(n_others) / n_frames.max(1) as f64;
-    let area_px = (high[0] - low[0]).max(1.0) * (high[1] - low[1]).max(1.0);
-    (mean / (n_frames.max(1) as f64 * area_px)).max(f64::EPSILON)
+        (high - low).max(1.0)
+    });
+    let volume = n_frames.max(1) as f64 * range_px[0] * range_px[1];
+    (n_others as f64 / volume).max(f64::EPSILON)
 }
 
 /// Turns the likelihood ratios of the links into probabilities.

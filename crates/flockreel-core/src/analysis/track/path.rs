@@ -31,7 +31,7 @@ pub(super) fn choose(
         .iter()
         .filter(|stretch| may_be_animal(stretch) || is_pinned(stretch))
         .collect();
-    let identity = Identity::new(&bodies);
+    let identity = Identity::new(&bodies, n_others(&stretches, frames.len()));
     let pinned = bodies.iter().position(|body| is_pinned(body));
     let path_of = |anchor: usize| judged(&bodies, &identity.same_as(anchor), frames.len());
     let path = match (pinned, follow) {
@@ -45,6 +45,20 @@ pub(super) fn choose(
         }
     };
     path.unwrap_or_else(|| vec![None; frames.len()])
+}
+
+/// Returns how many bodies besides one are in view in half of the frames or more, groups counted by their bodies.
+fn n_others(stretches: &[Stretch], n_frames: usize) -> usize {
+    let mut n_in_view = vec![0; n_frames];
+    for stretch in stretches
+        .iter()
+        .filter(|stretch| stretch.misfit < FITS || stretch.n_bodies > 1)
+    {
+        let in_view = &mut n_in_view[stretch.first..stretch.end()];
+        in_view.iter_mut().for_each(|n| *n += stretch.n_bodies);
+    }
+    let usual = order::median(n_in_view.into_iter().map(|n| n as f64)).unwrap_or(0.0);
+    (usual as usize).saturating_sub(1)
 }
 
 /// Returns the candidate of each frame whose stretch probably fits and shows the animal; `None` where two do, each a

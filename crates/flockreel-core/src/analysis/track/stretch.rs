@@ -39,7 +39,7 @@ pub(super) struct Stretch {
     pub(super) log_area: f64,
     /// Median misfit to the subject.
     pub(super) misfit: f64,
-    /// Number of bodies that it shows; more than one where they touch.
+    /// Number of bodies that it shows: more than one where they touch, none in the smaller pieces of one.
     pub(super) n_bodies: usize,
 }
 
@@ -92,21 +92,34 @@ pub(super) fn divide(frames: &[&[Candidate]], subject: &Subject) -> Vec<Stretch>
         let mut n_bodies = vec![1; candidates.len()];
         let mut is_new = vec![false; candidates.len()];
         for (whole, stretch) in before.iter().zip(earlier.iter_mut().flatten()) {
-            let parts = parts_of(whole, candidates, before, area_px);
-            stretch.n_bodies = stretch.n_bodies.max(parts.len());
+            let (parts, are_bodies) = parts_of(whole, candidates, before, area_px);
+            if are_bodies {
+                stretch.n_bodies = stretch.n_bodies.max(parts.len());
+            }
+            let area = |part: &usize| candidates[*part].look.area_px;
+            let whole_px: f64 = parts.iter().map(area).sum();
+            let largest = parts
+                .iter()
+                .copied()
+                .max_by(|a, b| area(a).total_cmp(&area(b)));
             for &part in &parts {
-                let areas = parts.iter().map(|&part| candidates[part].look.area_px);
-                let share = candidates[part].look.area_px / areas.sum::<f64>();
-                n_bodies[part] = ((share * stretch.n_bodies as f64).round() as usize).max(1);
-                is_new[part] = true;
+                let least = usize::from(are_bodies || Some(part) == largest);
+                let share = area(&part) / whole_px * stretch.n_bodies as f64;
+                n_bodies[part] = (share.round() as usize).max(least);
+                is_new[part] = are_bodies || Some(part) != largest;
             }
         }
         for (at, whole) in candidates.iter().enumerate() {
-            let parts = parts_of(whole, before, candidates, area_px);
-            if !parts.is_empty() {
-                let in_part = |part: usize| earlier[part].as_ref().map_or(1, |part| part.n_bodies);
-                n_bodies[at] = parts.into_iter().map(in_part).sum();
+            let (parts, are_bodies) = parts_of(whole, before, candidates, area_px);
+            let in_parts = parts
+                .iter()
+                .flat_map(|&part| &earlier[part])
+                .map(|part| part.n_bodies);
+            if are_bodies {
+                n_bodies[at] = in_parts.sum();
                 is_new[at] = true;
+            } else if let Some(most) = in_parts.max() {
+                n_bodies[at] = most;
             }
         }
         open = Vec::with_capacity(candidates.len());
@@ -185,17 +198,17 @@ fn partner(
     is_sure.then_some(from)
 }
 
-/// Returns the indices of the bodies of the frame before or after, `parts`, that `whole` shows as one component; empty
-/// if it shows one body.
+/// Returns the indices of the candidates of the frame before or after, `parts`, that `whole` shows as one component,
+/// none if it is only one, and whether they are bodies.
 ///
-/// They lie in its box and continue nowhere else among `beside`, the candidates of its own frame. The pieces of one
-/// body also do. But there the whole has the usual area `area_px`, and the pieces do not.
+/// They lie in its box and continue nowhere else among `beside`, the candidates of its own frame. If they are pieces of
+/// one body, the whole is nearer to the usual area `area_px` than they are together.
 fn parts_of(
     whole: &Candidate,
     parts: &[Candidate],
     beside: &[Candidate],
     area_px: f64,
-) -> Vec<usize> {
+) -> (Vec<usize>, bool) {
     let off = |c: &Candidate| libm::log(c.look.area_px / area_px).abs();
     let is_inside = |at: &usize| {
         let to = nearest(&parts[*at], beside).map(|to| &raw const beside[to]);
@@ -204,11 +217,9 @@ fn parts_of(
     };
     let inside: Vec<usize> = (0..parts.len()).filter(is_inside).collect();
     let off_parts: f64 = inside.iter().map(|&at| off(&parts[at])).sum();
-    if inside.len() > 1 && off(whole) > off_parts {
-        inside
-    } else {
-        Vec::new()
-    }
+    let n_parts = inside.len();
+    let parts = if n_parts > 1 { inside } else { Vec::new() };
+    (parts, n_parts > 1 && off(whole) > off_parts)
 }
 
 fn contains(rect: Rect, [x, y]: [f64; 2]) -> bool {
