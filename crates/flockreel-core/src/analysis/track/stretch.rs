@@ -78,55 +78,21 @@ impl Stretch {
 /// Returns the stretches by first frame; each candidate belongs to one.
 pub(super) fn divide(frames: &[&[Candidate]], subject: &Subject) -> Vec<Stretch> {
     let reach_px = subject.diagonal_px + usual_step_px(frames);
-    let fitting = frames
-        .iter()
-        .copied()
-        .flatten()
-        .filter(|candidate| candidate.cost < FITS);
+    let fitting = frames.iter().copied().flatten();
+    let fitting = fitting.filter(|candidate| candidate.cost < FITS);
     let area_px = order::median(fitting.map(|candidate| candidate.look.area_px)).unwrap_or(1.0);
     let mut done: Vec<Stretch> = Vec::new();
     let mut open: Vec<Stretch> = Vec::new();
     for (t, &candidates) in frames.iter().enumerate() {
         let before = t.checked_sub(1).map_or(&[][..], |before| frames[before]);
+        let starts = starts(before, candidates, &mut open, area_px);
         let mut earlier: Vec<Option<Stretch>> = open.into_iter().map(Some).collect();
-        let mut n_bodies = vec![1; candidates.len()];
-        let mut is_new = vec![false; candidates.len()];
-        for (whole, stretch) in before.iter().zip(earlier.iter_mut().flatten()) {
-            let (parts, are_bodies) = parts_of(whole, candidates, before, area_px);
-            if are_bodies {
-                stretch.n_bodies = stretch.n_bodies.max(parts.len());
-            }
-            let area = |part: &usize| candidates[*part].look.area_px;
-            let whole_px: f64 = parts.iter().map(area).sum();
-            let largest = parts
-                .iter()
-                .copied()
-                .max_by(|a, b| area(a).total_cmp(&area(b)));
-            for &part in &parts {
-                let least = usize::from(are_bodies || Some(part) == largest);
-                let share = area(&part) / whole_px * stretch.n_bodies as f64;
-                n_bodies[part] = (share.round() as usize).max(least);
-                is_new[part] = are_bodies || Some(part) != largest;
-            }
-        }
-        for (at, whole) in candidates.iter().enumerate() {
-            let (parts, are_bodies) = parts_of(whole, before, candidates, area_px);
-            let in_parts = parts
-                .iter()
-                .flat_map(|&part| &earlier[part])
-                .map(|part| part.n_bodies);
-            if are_bodies {
-                n_bodies[at] = in_parts.sum();
-                is_new[at] = true;
-            } else if let Some(most) = in_parts.max() {
-                n_bodies[at] = most;
-            }
-        }
         open = Vec::with_capacity(candidates.len());
         for (at, candidate) in candidates.iter().enumerate() {
-            let from = partner(candidate, before, candidates, reach_px).filter(|_| !is_new[at]);
+            let from = partner(candidate, before, candidates, reach_px);
+            let from = from.filter(|_| !starts[at].is_sure);
             let known = from.and_then(|from| earlier[from].take());
-            let mut stretch = known.unwrap_or_else(|| Stretch::starting(t, n_bodies[at]));
+            let mut stretch = known.unwrap_or_else(|| Stretch::starting(t, starts[at].n_bodies));
             stretch.add(at, candidate);
             open.push(stretch);
         }
@@ -141,6 +107,58 @@ pub(super) fn divide(frames: &[&[Candidate]], subject: &Subject) -> Vec<Stretch>
     }
     done.sort_by_key(|stretch| stretch.first);
     done
+}
+
+/// A stretch that may start at a candidate.
+#[derive(Clone, Copy)]
+struct Start {
+    /// Number of bodies that it would show.
+    n_bodies: usize,
+    /// Whether it starts there for certain: bodies touched or parted, or a piece came off.
+    is_sure: bool,
+}
+
+/// Returns the start at each candidate, from the stretches that are `open` in the frame before, one per candidate.
+fn starts(
+    before: &[Candidate],
+    candidates: &[Candidate],
+    open: &mut [Stretch],
+    area_px: f64,
+) -> Vec<Start> {
+    let new = Start {
+        n_bodies: 1,
+        is_sure: false,
+    };
+    let mut starts = vec![new; candidates.len()];
+    for (whole, stretch) in before.iter().zip(open.iter_mut()) {
+        let (parts, are_bodies) = parts_of(whole, candidates, before, area_px);
+        if are_bodies {
+            stretch.n_bodies = stretch.n_bodies.max(parts.len());
+        }
+        let area = |part: &usize| candidates[*part].look.area_px;
+        let whole_px: f64 = parts.iter().map(area).sum();
+        let largest = parts.iter().copied();
+        let largest = largest.max_by(|a, b| area(a).total_cmp(&area(b)));
+        for &part in &parts {
+            let is_main = Some(part) == largest;
+            let share = area(&part) / whole_px * stretch.n_bodies as f64;
+            starts[part] = Start {
+                n_bodies: (share.round() as usize).max(usize::from(are_bodies || is_main)),
+                is_sure: are_bodies || !is_main,
+            };
+        }
+    }
+    for (start, whole) in starts.iter_mut().zip(candidates) {
+        let (parts, are_bodies) = parts_of(whole, before, candidates, area_px);
+        let in_parts = parts.iter().map(|&part| open[part].n_bodies);
+        if are_bodies {
+            start.n_bodies = in_parts.sum();
+            start.is_sure = true;
+        } else if let Some(most) = in_parts.max() {
+            start.n_bodies = most;
+        }
+    }
+    starts
 }
 
 impl Stretch {
