@@ -25,6 +25,8 @@ struct Link {
 pub(super) struct Identity<'a> {
     bodies: &'a [&'a Stretch],
     links: Vec<Link>,
+    /// Usual number of other bodies in view.
+    n_others: usize,
 }
 
 impl<'a> Identity<'a> {
@@ -42,10 +44,16 @@ impl<'a> Identity<'a> {
             }
         }
         propagate(&mut links, bodies.len());
-        Identity { bodies, links }
+        Identity {
+            bodies,
+            links,
+            n_others,
+        }
     }
 
     /// Returns for each body the probability that it is the same as body `anchor`.
+    ///
+    /// If there is usually no other, the likelier case is certain.
     pub(super) fn same_as(&self, anchor: usize) -> Vec<f64> {
         let mut later = vec![0.0; self.bodies.len()];
         let mut earlier = later.clone();
@@ -58,7 +66,9 @@ impl<'a> Identity<'a> {
             earlier[link.from] += link.p * earlier[link.to];
         }
         let best = later.into_iter().zip(earlier);
-        best.map(|(a, b)| a.max(b).min(1.0)).collect()
+        let best = best.map(|(a, b)| a.max(b).min(1.0));
+        best.map(|p| if self.n_others == 0 { p.round() } else { p })
+            .collect()
     }
 }
 
