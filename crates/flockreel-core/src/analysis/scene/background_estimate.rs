@@ -27,10 +27,10 @@ const FILL_SEED: u64 = 1;
 const BUSY_SHARE: f64 = 0.03;
 /// Factor by which a higher threshold must raise the starkness to be kept. Free choice.
 const MIN_STARKNESS_RATIO: f64 = 1.5;
+/// Share of ghosts in all that differs, above which a state's background shows the animal. Free choice.
+const MAX_GHOST_SHARE: f64 = 0.05;
 /// Least core threshold, as a share of the animal's contrast. Free choice.
 const CORE_CONTRAST: f64 = 0.25;
-/// Factor by which medians must explain the samples better than commonest values do. Free choice.
-const MIN_SCORE_RATIO: f64 = 3.0;
 
 /// The backgrounds of a scene during their estimation.
 pub(super) struct BackgroundEstimate {
@@ -166,40 +166,42 @@ impl BackgroundEstimate {
         backgrounds.for_each(|background| background.set_threshold(threshold));
     }
 
-    /// Returns the groups as short time windows with backgrounds of their own, and their survey. Short windows
-    /// show a moving animal even where the scene changes over time.
-    pub(super) fn for_short_windows(&self, samples: &Samples) -> (BackgroundEstimate, Survey) {
-        // The commonest values show a mouse that rests among bedding it kicks about. Medians show a large
-        // animal that hovers.
-        let surveyed = |typical: fn(&Samples, u64) -> Frame| {
-            let mut estimate = self.with_short_windows(samples, typical);
+    /// Returns the backgrounds for the first survey, and the survey: those of the states or those of short time
+    /// windows, whichever explain the samples better. The states show an animal that lingers; short windows show
+    /// one that moves, even where the scene changes over time.
+    pub(super) fn for_first_survey(&self, samples: &Samples) -> (BackgroundEstimate, Survey) {
+        let windows = self.groups.iter();
+        let windows = windows.flat_map(|&group| windows::short_windows(group));
+        let of_states = self.with_pictures(self.groups.clone(), samples, |at, _| {
+            self.backgrounds[at].frame.clone()
+        });
+        let of_windows = self.with_pictures(windows.collect(), samples, |_, group| {
+            samples.commonest_frame(group.samples)
+        });
+        let [of_states, of_windows] = [of_states, of_windows].map(|mut estimate| {
             let survey = estimate.survey(samples);
             (estimate, survey)
-        };
-        let medians = surveyed(Samples::median_frame);
-        let commonest = surveyed(Samples::commonest_frame);
-        if medians.1.score < MIN_SCORE_RATIO * commonest.1.score {
-            commonest
+        });
+        let shows_animal = of_states.1.ghost_share() > MAX_GHOST_SHARE;
+        if !shows_animal && of_states.1.explained() > of_windows.1.explained() {
+            of_states
         } else {
-            medians
+            of_windows
         }
     }
 
-    fn with_short_windows(
+    /// Returns an estimate with the given groups and their pictures.
+    fn with_pictures(
         &self,
+        groups: Vec<SampleGroup>,
         samples: &Samples,
-        typical: fn(&Samples, u64) -> Frame,
+        picture: impl Fn(usize, &SampleGroup) -> Frame,
     ) -> BackgroundEstimate {
-        let windows = self
-            .groups
-            .iter()
-            .flat_map(|&group| windows::short_windows(group));
-        let groups: Vec<SampleGroup> = windows.collect();
-        let background = |group: &SampleGroup| Background {
+        let background = |(at, group): (usize, &SampleGroup)| Background {
             light: group.light,
-            ..Background::without_noise(typical(samples, group.samples), self.threshold)
+            ..Background::without_noise(picture(at, group), self.threshold)
         };
-        let backgrounds = groups.iter().map(background).collect();
+        let backgrounds = groups.iter().enumerate().map(background).collect();
         BackgroundEstimate::new(samples, groups, backgrounds, self.threshold)
     }
 
@@ -212,21 +214,21 @@ impl BackgroundEstimate {
         occupancy
     }
 
-    /// Returns the samples in which each pixel shows the scene. It combines the survey of short windows with
-    /// the places at which the subject rests for longer than one window.
+    /// Returns the samples in which each pixel shows the scene. It combines the first survey with the
+    /// places at which the subject rests for longer than one window.
     pub(super) fn occupancy_over_time(
         &self,
-        short: &BackgroundEstimate,
+        first: &BackgroundEstimate,
         samples: &Samples,
         survey: &Survey,
     ) -> Occupancy {
-        let mut occupancy = short.occupancy(samples, survey);
+        let mut occupancy = first.occupancy(samples, survey);
         if let Some(subject) = &survey.subject {
             for (group, background) in self.groups.iter().zip(&self.backgrounds) {
-                let windows: Vec<(SampleGroup, &Background)> = short
+                let windows: Vec<(SampleGroup, &Background)> = first
                     .groups
                     .iter()
-                    .zip(&short.backgrounds)
+                    .zip(&first.backgrounds)
                     .filter(|(window, _)| window.samples & group.samples != 0)
                     .map(|(window, background)| (*window, background))
                     .collect();

@@ -1,8 +1,8 @@
 //! Detects the animal's mirror image in a water surface, a pane or a mirror.
 //!
-//! An image is a second object that moves as the animal does, mirrored about a horizontal or vertical line.
-//! Their coordinates across the line then have a constant sum. Two animals move independently, so the sum
-//! varies.
+//! An image is a second object that moves as the animal does, mirrored about a line. The steps from image to
+//! object then have the direction of the line's normal, and their middles lie on the line. Two animals move
+//! independently, so the steps vary.
 
 use crate::analysis::subject::Look;
 use crate::order::median;
@@ -18,60 +18,61 @@ const MIN_PAIRS: usize = 6;
 /// Free choice.
 const MIN_RANGE: f64 = 0.5;
 
-/// A line along an axis of the picture, and the side of it on which images lie.
+/// A line in the picture, and the side of it on which images lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mirror {
-    /// The coordinate that is mirrored: 0 for x, 1 for y.
-    axis: usize,
-    /// Coordinate of the line along `axis`, pixels.
+    /// Unit normal of the line, toward the side of the images.
+    normal: [f64; 2],
+    /// Distance of the line from the picture's corner along the normal, pixels.
     line_px: f64,
-    /// Whether images have the smaller coordinate.
-    is_before: bool,
 }
 
 impl Mirror {
     /// Returns whether an object with this centroid is an image.
     pub fn is_image(&self, centroid_px: [f64; 2]) -> bool {
-        (centroid_px[self.axis] < self.line_px) == self.is_before
+        along(self.normal, centroid_px) > self.line_px
     }
 
     /// Splits a component at the line. The animal touches its image where it touches the mirror.
     pub fn split(&self, component: Component) -> Vec<Component> {
         let rect = component.rect;
-        let line = self.line_px.round().max(0.0) as u32;
-        let [mut before, mut after] = [rect; 2];
-        match self.axis {
-            0 if rect.x < line && line < rect.right() => {
-                before.w = line - rect.x;
-                (after.x, after.w) = (line, rect.right() - line);
-            }
-            1 if rect.y < line && line < rect.bottom() => {
-                before.h = line - rect.y;
-                (after.y, after.h) = (line, rect.bottom() - line);
-            }
-            _ => return vec![component],
-        }
-        [before, after]
+        let corners = [rect.x, rect.right()].map(f64::from);
+        let corners = corners
             .into_iter()
-            .flat_map(|half| runs::components(&component.mask(half)))
-            .collect()
+            .flat_map(|x| [rect.y, rect.bottom()].map(|y| [x, f64::from(y)]));
+        let n_behind = corners.filter(|&corner| self.is_image(corner)).count();
+        if n_behind.is_multiple_of(4) {
+            return vec![component];
+        }
+        let mut sides = [component.mask(rect), component.mask(rect)];
+        for k in 0..sides[0].bits.len() {
+            let (x, y) = (k as u32 % rect.w, k as u32 / rect.w);
+            let center = [rect.x + x, rect.y + y].map(|at| f64::from(at) + 0.5);
+            sides[usize::from(self.is_image(center))].bits[k] = 0;
+        }
+        sides.iter().flat_map(runs::components).collect()
     }
 
     /// Returns the mirror that explains the pairs of objects seen together in samples; `None` where none
-    /// does. Prefers a horizontal line. `diagonal_px` is the animal's diagonal.
+    /// does. `diagonal_px` is the animal's diagonal.
     pub(super) fn from_pairs(pairs: &[[&Look; 2]], diagonal_px: f64) -> Option<Mirror> {
-        [1, 0]
-            .into_iter()
-            .find_map(|axis| Mirror::along(axis, pairs, diagonal_px))
-    }
-
-    fn along(axis: usize, pairs: &[[&Look; 2]], diagonal_px: f64) -> Option<Mirror> {
         let tolerance_px = MAX_DEVIATION * diagonal_px;
-        let sum = |[a, b]: &[&Look; 2]| a.centroid_px[axis] + b.centroid_px[axis];
-        let apart = |[a, b]: &[&Look; 2]| a.centroid_px[1 - axis] - b.centroid_px[1 - axis];
-        let usual = median(pairs.iter().map(sum))?;
+        let step = |[a, b]: &[&Look; 2]| [0, 1].map(|c| a.centroid_px[c] - b.centroid_px[c]);
+        let middle =
+            |[a, b]: &[&Look; 2]| [0, 1].map(|c| (a.centroid_px[c] + b.centroid_px[c]) / 2.0);
+        // The direction of most steps, without a sign: the axis of their second moments, of unit steps.
+        let mut doubled = [0.0; 2];
+        for [dx, dy] in pairs.iter().map(step) {
+            let angle = 2.0 * libm::atan2(dy, dx);
+            doubled = [doubled[0] + libm::cos(angle), doubled[1] + libm::sin(angle)];
+        }
+        let angle = libm::atan2(doubled[1], doubled[0]) / 2.0;
+        let normal = [libm::cos(angle), libm::sin(angle)];
+        let tangent = [-normal[1], normal[0]];
+        let line_px = median(pairs.iter().map(|pair| along(normal, middle(pair))))?;
         let agrees = |pair: &&[&Look; 2]| {
-            (sum(pair) - usual).abs() < tolerance_px && apart(pair).abs() < tolerance_px
+            2.0 * (along(normal, middle(pair)) - line_px).abs() < tolerance_px
+                && along(tangent, step(pair)).abs() < tolerance_px
         };
         let agreeing: Vec<&[&Look; 2]> = pairs.iter().filter(agrees).collect();
         let moved = |c: usize| {
@@ -81,19 +82,26 @@ impl Mirror {
         let enough = agreeing.len() >= MIN_PAIRS
             && agreeing.len() as f64 >= MIN_AGREEING_SHARE * pairs.len() as f64
             && moved(0).max(moved(1)) > MIN_RANGE * diagonal_px;
-        let line_px = usual / 2.0;
         // An image has less contrast than its object.
-        let fainter_before = |[a, b]: &&&[&Look; 2]| {
-            let a_is_before = a.centroid_px[axis] < b.centroid_px[axis];
-            (a.contrast < b.contrast) == a_is_before
+        let fainter_ahead = |pair: &&&[&Look; 2]| {
+            (pair[0].contrast < pair[1].contrast) == (along(normal, step(pair)) > 0.0)
         };
-        let n_before = agreeing.iter().filter(fainter_before).count();
+        let n_ahead = agreeing.iter().filter(fainter_ahead).count();
+        let sign = if 2 * n_ahead > agreeing.len() {
+            1.0
+        } else {
+            -1.0
+        };
         enough.then_some(Mirror {
-            axis,
-            line_px,
-            is_before: 2 * n_before > agreeing.len(),
+            normal: normal.map(|v| sign * v),
+            line_px: sign * line_px,
         })
     }
+}
+
+/// Returns the distance of a point along a unit vector, pixels.
+fn along(unit: [f64; 2], point: [f64; 2]) -> f64 {
+    unit[0] * point[0] + unit[1] * point[1]
 }
 
 #[cfg(test)]
@@ -139,6 +147,9 @@ mod tests {
         let mirror = found(|_, [x, y]| [x + 1.0, 222.0 - y]).expect("it is an image");
         assert!(mirror.is_image([100.0, 40.0]) && !mirror.is_image([100.0, 140.0]));
         assert_eq!(found(|k, _| [200.0 + 90.0 * libm::cos(k), 60.0]), None);
+        // A wall at an angle: the image of (x, y) is (y + 150, x - 150).
+        let slanted = found(|_, [x, y]| [y + 150.0, x - 150.0]).expect("it is an image");
+        assert!(slanted.is_image([300.0, 60.0]) && !slanted.is_image([200.0, 160.0]));
     }
 
     #[test]

@@ -182,8 +182,8 @@ pub fn estimate(
         Some(image) => BackgroundEstimate::from_image(image, &mut samples, params)?,
         None => BackgroundEstimate::from_states(&mut samples, params)?,
     };
-    let (short_windows, mut survey) = estimate.for_short_windows(&samples);
-    let mut occupancy = estimate.occupancy_over_time(&short_windows, &samples, &survey);
+    let (first, mut survey) = estimate.for_first_survey(&samples);
+    let mut occupancy = estimate.occupancy_over_time(&first, &samples, &survey);
     if given.is_none() {
         estimate.split_in_time(&samples, &occupancy);
     }

@@ -193,6 +193,25 @@ impl Survey {
         self.score / area_px.sqrt()
     }
 
+    /// Returns the subject's score times the share of all that differs which is the animal. The rest is scenery,
+    /// other objects, or ghosts.
+    pub(super) fn explained(&self) -> f64 {
+        let chosen = self.looks.iter().zip(&self.animal);
+        let animals = chosen.filter_map(|(looks, at)| Some(&looks[(*at)?]));
+        self.score * self.share_px(animals)
+    }
+
+    /// Returns the share of all that differs which is a ghost, 0..=1.
+    pub(super) fn ghost_share(&self) -> f64 {
+        let looks = self.looks.iter().flatten();
+        self.share_px(looks.filter(|look| look.is_ghost))
+    }
+
+    fn share_px<'a>(&self, some: impl Iterator<Item = &'a Look>) -> f64 {
+        let all_px: f64 = self.looks.iter().flatten().map(|look| look.area_px).sum();
+        some.map(|look| look.area_px).sum::<f64>() / all_px.max(1.0)
+    }
+
     /// Returns the total area of the components of a sample, pixels: the median over the samples.
     pub(super) fn differing_px(&self) -> f64 {
         let area_px = |looks: &Vec<Look>| looks.iter().map(|look| look.area_px).sum::<f64>();

@@ -11,7 +11,7 @@ use crate::analysis::scene::background::Background;
 use crate::geometry::Rect;
 use crate::order;
 use crate::raster::Mask;
-use crate::raster::runs::{self, Component};
+use crate::raster::runs::{self, Component, Run};
 
 /// Brightness of a cast shadow as a share of the background's. A weaker one is soft, a stronger one cannot be
 /// told from a black animal. Free choice.
@@ -22,8 +22,6 @@ const MAX_DEVIATION: f32 = 0.12;
 const RADIUS: i64 = 2;
 /// Level added to frame and background, so that noise near black changes the ratio little. Free choice.
 const OFFSET: f32 = 8.0;
-/// Width of the soft rim, pixels. Free choice.
-const RIM_PX: u32 = 3;
 /// A shadow lump has this share of a component's area, in this share of the components. Free choice.
 const MIN_LUMP_SHARE: f64 = 0.2;
 const MIN_FREQUENCY: f64 = 0.4;
@@ -165,11 +163,19 @@ impl Shadow {
         }
     }
 
-    /// Returns the broad parts with the soft rim around them.
+    /// Returns the broad parts with the soft rim around them: the even pixels that lead to them.
     fn with_rim(self) -> Mask {
-        let mut shadow = self.broad.dilated_by(RIM_PX);
-        for (bit, even) in shadow.bits.iter_mut().zip(self.even.bits) {
-            *bit &= even;
+        let mut shadow = self.broad;
+        let rect = shadow.rect;
+        for part in runs::components(&self.even) {
+            let pixels = |run: &Run| {
+                let first = ((run.y - rect.y) * rect.w) as usize;
+                first + (run.x0 - rect.x) as usize..first + (run.x1 - rect.x) as usize
+            };
+            let is_set = |run: &Run| shadow.bits[pixels(run)].contains(&1);
+            if part.runs.iter().any(is_set) {
+                (part.runs.iter()).for_each(|run| shadow.bits[pixels(run)].fill(1));
+            }
         }
         shadow
     }

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 pub mod asymmetry;
 mod body;
 mod confidence;
+mod evidence;
 mod identity;
 mod motion;
 mod movers;
@@ -31,6 +32,7 @@ use super::subject::{Look, MIN_AREA_PX};
 use super::{Error, MIN_FRAMES, Params};
 use crate::geometry::Rect;
 use crate::library::Mover;
+use crate::order;
 use crate::progress::Progress;
 use crate::raster::runs::Component;
 use crate::raster::{Frame, RgbaImage};
@@ -142,6 +144,7 @@ pub fn follow(
         params.follow
     };
     let chosen = path::choose(&candidates, &scene.subject, follow, pin);
+    let chosen = examined(chosen, &candidates);
     let movers = results.iter().zip(&chosen).map(|(result, &chosen)| {
         let box_px = chosen.map(|(at, _)| result.candidates[at].look.box_px);
         movers::outside_animal(&result.movers, box_px)
@@ -163,6 +166,26 @@ pub fn follow(
         movers,
         scratch,
     })
+}
+
+/// Lowers the confidence of sightings by evidence from outside the subject. A sighting that is probably wrong is
+/// dropped.
+fn examined(
+    chosen: Vec<Option<(usize, f64)>>,
+    candidates: &[&[Candidate]],
+) -> Vec<Option<(usize, f64)>> {
+    let at = |(t, found): (usize, &Option<(usize, f64)>)| Some(&candidates[t][found.as_ref()?.0]);
+    let areas = chosen.iter().enumerate().filter_map(at);
+    let usual_px = order::median(areas.map(|candidate| candidate.look.area_px));
+    let judged = |(found, candidates): (Option<(usize, f64)>, &&[Candidate])| {
+        let (at, confidence) = found?;
+        let Candidate { look, sighting, .. } = &candidates[at];
+        let share = look.area_px / usual_px?;
+        let edges = sighting.edge_share.unwrap_or(1.0);
+        let confidence = confidence::of_extent(confidence, share, edges);
+        (confidence >= confidence::FOUND).then_some((at, confidence))
+    };
+    chosen.into_iter().zip(candidates).map(judged).collect()
 }
 
 impl FrameResult {

@@ -4,6 +4,7 @@
 
 use super::asymmetry::Asymmetry;
 use super::body;
+use super::evidence;
 use crate::analysis::matte;
 use crate::analysis::pose::moments::{self, Moments};
 use crate::analysis::scene::background::Background;
@@ -25,6 +26,8 @@ pub struct Sighting {
     pub reach_px: [f64; 3],
     /// Probability that the centroid lies within a tenth of the body length of the true one (`confidence`).
     pub confidence: f64,
+    /// Share of the outline that lies on edges of the frame which the background does not have (`evidence`), 0..=1.
+    pub edge_share: Option<f64>,
     /// Moments of the matte, weighted by alpha.
     pub moments: Moments,
     /// Differences between the ends and between the sides; `None` without an axis.
@@ -83,6 +86,7 @@ impl Sighting {
             at: 0,
             reach_px: reach_px(rect, matte, moments.centroid_px),
             confidence: 0.0,
+            edge_share: None,
             moments,
             extent_px: [extent_px(axis), extent_px(axis + quarter)],
             upright_px: extent_px(quarter),
@@ -140,6 +144,12 @@ impl FrameView<'_> {
             .then_some((SURROUNDINGS_MARGIN * length_px).ceil() as u32);
         Ok(Some(Sighting {
             at: scratch.put(&matte.image.pixels)?,
+            edge_share: evidence::edge_share(
+                self.frame,
+                self.background,
+                self.light,
+                &solid(matte.rect, &matte.image),
+            ),
             box_px: rect,
             cut,
             surroundings: margin_px

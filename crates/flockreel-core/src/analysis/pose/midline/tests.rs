@@ -66,6 +66,7 @@ impl BentFish {
             rect,
             at: 0,
             reach_px: [0.0; 3],
+            edge_share: None,
             confidence: 1.0,
             asymmetry: None,
             body_rad: None,
