@@ -6,8 +6,6 @@ use super::asymmetry::Asymmetry;
 use super::body;
 use crate::analysis::matte;
 use crate::analysis::pose::moments::{self, Moments};
-use crate::analysis::scene::background::Background;
-use crate::analysis::scene::light::Light;
 use crate::analysis::{silhouette, subject};
 use crate::geometry::Rect;
 use crate::raster::runs::Component;
@@ -101,16 +99,10 @@ pub struct CandidateShape {
     pub silhouette: Mask,
 }
 
-/// A frame with the background to compare it with.
+/// A frame in which animals are cut out.
 pub struct FrameView<'a> {
-    /// The frame.
-    pub frame: &'a Frame,
-    /// The background.
-    pub background: &'a Background,
-    /// Light of the frame relative to the background.
-    pub light: &'a Light,
-    /// Boxes to ignore.
-    pub ignored: &'a [Rect],
+    /// The frame and its scene.
+    pub view: matte::View<'a>,
     /// Whether to store the animal's surroundings.
     pub keeps_surroundings: bool,
 }
@@ -125,13 +117,7 @@ impl FrameView<'_> {
         let rect = shape.component.rect;
         let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
         let silhouette = &shape.silhouette;
-        let matte = matte::pull(
-            self.frame,
-            self.background,
-            self.light,
-            silhouette,
-            length_px,
-        );
+        let matte = matte::pull(&self.view, silhouette, length_px);
         let Some(measured) = Sighting::measured(matte.rect, &matte.image) else {
             return Ok(None);
         };
@@ -155,18 +141,20 @@ impl FrameView<'_> {
         margin_px: u32,
         scratch: &dyn Scratch,
     ) -> Result<Surroundings, Full> {
-        let rect = rect.inflated(margin_px, self.frame.width, self.frame.height);
-        let seen = silhouette::difference(self.frame, self.background, self.light, rect).rgb;
+        let rect = rect.inflated(margin_px, self.view.frame.width, self.view.frame.height);
+        let seen =
+            silhouette::difference(self.view.frame, self.view.background, self.view.light, rect)
+                .rgb;
         let at = scratch.put(&seen.pixels)?;
         Ok(Surroundings { rect, at })
     }
 
     /// Returns whether a box touches the border of the frame or an ignored box.
     fn cuts(&self, rect: Rect) -> bool {
-        let (width, height) = (self.frame.width, self.frame.height);
+        let (width, height) = (self.view.frame.width, self.view.frame.height);
         let around = rect.inflated(1, width, height);
         let meets = |ignored: &Rect| !ignored.intersection(&around).is_empty();
-        subject::touches_border(rect, [width, height]) || self.ignored.iter().any(meets)
+        subject::touches_border(rect, [width, height]) || self.view.ignored.iter().any(meets)
     }
 }
 

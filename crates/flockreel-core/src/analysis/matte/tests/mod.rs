@@ -44,13 +44,17 @@ fn drawn_on(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Drawn {
             u8::from(ground(k % width, k / width).abs_diff(shade(k % width, k / width)) > 9);
     }
     silhouette.fill_holes();
-    let matte = pull(
-        &picture(shade),
-        &background,
-        &Light::NEUTRAL,
-        &silhouette,
-        60.0,
-    );
+    let frame = picture(shade);
+    let difference = silhouette::difference(&frame, &background, &Light::NEUTRAL, silhouette.rect);
+    let coat = Coat::learn(&[(difference, &background, silhouette.clone())], true);
+    let view = View {
+        frame: &frame,
+        background: &background,
+        light: &Light::NEUTRAL,
+        coat: &coat,
+        ignored: &[],
+    };
+    let matte = pull(&view, &silhouette, 60.0);
     Drawn { matte, shade }
 }
 
