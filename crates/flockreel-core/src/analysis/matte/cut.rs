@@ -20,7 +20,8 @@ const MAX_ODDS: f32 = 6.0;
 const SILHOUETTE_ODDS: f32 = 1.0;
 /// Cost of two neighbors on two sides where the frame is even. Free choice.
 const SMOOTHNESS: f32 = 1.5;
-/// Half the width of gaps that separate no pieces, pixels. A wire across the animal leaves one.
+/// Greatest width of gaps in the silhouette that are of the animal, pixels. A wire across the animal leaves one.
+/// Gaps twice as wide separate no pieces.
 const MAX_GAP_PX: u32 = 2;
 
 /// A frame around a silhouette, with its background.
@@ -33,11 +34,16 @@ pub(super) struct Cut<'a> {
 }
 
 impl Cut<'_> {
-    /// Returns the animal's largest piece, with the floor that its thick parts enclose.
+    /// Returns the animal's largest piece, with the floor that its thick parts enclose. Returns the silhouette
+    /// where no pixel more likely shows the animal than the scene.
     pub(super) fn animal(&self, thick_px: u32) -> Mask {
         let mut odds = vec![f32::NAN; self.silhouette.bits.len()];
         let mut animal = self.likely(&mut odds);
         self.settle(&mut animal, &mut odds);
+        if animal.area() == 0 {
+            return self.silhouette.clone();
+        }
+        self.close_gaps(&mut animal);
         keep_largest_piece(&mut animal);
         add_enclosed(&mut animal, thick_px);
         animal
@@ -89,6 +95,13 @@ impl Cut<'_> {
                 }
             }
         }
+    }
+
+    /// Sets the pixels of narrow gaps in the silhouette.
+    fn close_gaps(&self, animal: &mut Mask) {
+        let closed = (animal.dilated_by(MAX_GAP_PX / 2)).eroded_by(MAX_GAP_PX / 2);
+        let gaps = closed.bits.iter().zip(&self.silhouette.bits);
+        (animal.bits.iter_mut().zip(gaps)).for_each(|(bit, (closed, own))| *bit |= closed & own);
     }
 
     /// Returns the log-odds that a pixel shows the animal; `odds` keeps those known.

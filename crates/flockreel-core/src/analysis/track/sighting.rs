@@ -9,7 +9,7 @@ use crate::analysis::pose::moments::{self, Moments};
 use crate::analysis::{silhouette, subject};
 use crate::geometry::Rect;
 use crate::raster::runs::Component;
-use crate::raster::{Frame, Mask, RgbaImage};
+use crate::raster::{Mask, RgbaImage};
 use crate::scratch::{Full, Scratch};
 
 /// The animal in one frame.

@@ -104,7 +104,7 @@ const BODY: Rect = Rect {
 fn with_shadow(x: u32, y: u32) -> u8 {
     match steps_away([x, y], BODY) {
         0 => FUR,
-        d => PAPER - 38u8.saturating_sub(3 * (d.min(20) - 1) as u8),
+        d => PAPER - 38u8.saturating_sub(9 * (d.min(6) - 1) as u8),
     }
 }
 
@@ -197,7 +197,7 @@ fn with_two_shadows(x: u32, y: u32) -> u8 {
     let is_along = (60..105).contains(&x);
     match (steps_away([x, y], BODY), y) {
         (0, _) => FUR,
-        (_, 31..35) if is_along => floor / 2,
+        (_, 31..35) if is_along => floor / 4,
         (_, 22..26 | 40..44) if is_along => (f32::from(floor) * 0.82) as u8,
         _ => floor,
     }
@@ -255,7 +255,7 @@ fn with_a_loop(x: u32, y: u32) -> u8 {
     match (steps_away([x, y], BODY), steps_away([x, y], LOOP)) {
         (0, _) => 200,
         (_, 1..=3) => 120,
-        (_, 0) => 9,
+        (_, 0) => 4,
         _ => 0,
     }
 }
