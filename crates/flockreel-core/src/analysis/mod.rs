@@ -15,6 +15,7 @@ pub mod subject;
 // Tracking and cutting out the animal.
 pub mod matte;
 pub mod occluders;
+mod palette;
 pub mod read_ahead;
 pub mod shadow;
 pub mod track;

@@ -1,148 +1,111 @@
-//! Separates the animal in a silhouette from the shadow and the floor around it.
+//! How much likelier a pixel shows the animal than the scene: colors learned over the whole film.
 //!
-//! The coat is the color of the pixels that differ most from the background. Pixels that differ much less,
-//! and are a darker background or within its noise, are no part of the animal.
+//! The animal has a palette. A pixel of the scene has the color of its background, that color in a shadow, or
+//! seldom any color of the scene, where something moved. All likelihoods are relative to even colors.
 
-use std::ops::RangeInclusive;
-
+use crate::analysis::palette::Palette;
 use crate::analysis::scene::background::Background;
-use crate::analysis::silhouette::{Difference, shadow};
-use crate::order::{median, percentile};
+use crate::analysis::silhouette::Difference;
 use crate::raster::Mask;
 
-/// A pixel is faint when it differs by less than this share of the difference of the starkest pixels. Free
-/// choice.
-const FAINT_SHARE: f64 = 0.3;
-/// A pixel has the coat's color when it differs from it by less than this share of its difference from the
-/// background. Free choice.
-const MATCH_SHARE: f64 = 0.25;
-/// Brightness of a shadow as a share of the background's. Free choice.
-const SHADOW_BRIGHTNESS: RangeInclusive<f32> = 0.45..=1.0;
+/// Deviation of a frame from its background beside the noise of the pixel, such as that of a codec around a
+/// moving animal, levels of 255. Free choice; 3 to 5 gives the same.
+const CODEC_NOISE: f32 = 3.0;
+/// Least brightness of a shadow as a share of the background's. Free choice; a lamp leaves about as much.
+const MIN_SHADOW: f32 = 0.3;
+/// Share of the scene near an animal that lies in shadow. Free choice.
+const SHADOW_SHARE: f32 = 0.1;
+/// Share of the scene near an animal that moved. Free choice; more takes gray feathers for a gray cage.
+const MOVED_SHARE: f32 = 0.01;
 
-/// The animal's appearance where it differs most from the background.
-pub(super) struct Coat<'a> {
-    difference: &'a Difference,
-    background: &'a Background,
-    /// 75th percentile of the differences from the background, levels of 255. A mean would sink with the
-    /// shadow.
-    starkest: f64,
-    /// 75th percentile of the differences as shares of the brightness, 0..=1.
-    starkest_share: f64,
-    /// Median R, G and B of the pixels that differ by at least `starkest`, levels of 255.
-    color: [f64; 3],
+/// Density of the animal's colors, relative to even colors, until they are learned. Free choice; without it, a
+/// gray animal before a gray floor loses all that a shadow may explain, and with more, shadows are learned.
+const COAT_DENSITY: f32 = 20.0;
+
+/// Colors of the animal and of the scene around it.
+pub struct Coat {
+    animal: Palette,
+    scene: Palette,
+    /// Whether the animal may extend beyond its silhouette. It may not where a part of the silhouette was cut
+    /// off, such as a tether or a mirror image.
+    pub grows: bool,
 }
 
-impl Coat<'_> {
-    pub(super) fn measure<'a>(
-        mask: &Mask,
-        difference: &'a Difference,
-        background: &'a Background,
-    ) -> Coat<'a> {
-        let mut coat = Coat {
-            difference,
-            background,
-            starkest: 0.0,
-            starkest_share: 0.0,
-            color: [0.0; 3],
+impl Coat {
+    /// Learns the colors from frames around the animal, each with its background and the animal's silhouette
+    /// in the same box.
+    ///
+    /// A pixel of a silhouette counts by the probability that it shows the animal rather than the background or
+    /// its shadow, where nothing but [`COAT_DENSITY`] is known of the animal's colors.
+    pub fn learn(seen: &[(Difference, &Background, Mask)], grows: bool) -> Coat {
+        let pixels = |side: u8| {
+            seen.iter().flat_map(move |(difference, background, mask)| {
+                let pixels = (0..mask.bits.len()).filter(move |&k| mask.bits[k] == side);
+                pixels.map(move |k| (difference, background, k))
+            })
         };
-        let covered = || (0..mask.bits.len()).filter(|&k| mask.bits[k] == 1);
-        let stark = |mut values: Vec<f64>| percentile(&mut values, 0.75).unwrap_or(0.0);
-        coat.starkest = stark(covered().map(|k| coat.level(k)).collect());
-        coat.starkest_share = stark(covered().map(|k| coat.share(k)).collect());
-        coat.color = [0, 1, 2].map(|c| {
-            let stark = covered().filter(|&k| coat.level(k) >= coat.starkest);
-            median(stark.map(|k| f64::from(difference.rgb.pixels[3 * k + c]))).unwrap_or(0.0)
+        let weighted = pixels(1).map(|(difference, background, k)| {
+            let scene = libm::expf(log_background(difference, background, k));
+            (color(difference, k), COAT_DENSITY / (COAT_DENSITY + scene))
         });
-        coat
-    }
-
-    /// Returns the coat that differs more from the background.
-    ///
-    /// The other one contains too much of a mirror image in a dark wall, or of a shadow on a brighter floor.
-    pub(super) fn or_starker(self, other: Self) -> Self {
-        if other.starkest > self.starkest {
-            other
-        } else {
-            self
+        Coat {
+            animal: Palette::weighted(weighted),
+            scene: Palette::new(pixels(0).map(|(difference, _, k)| color(difference, k))),
+            grows,
         }
     }
 
-    /// Returns the difference of a pixel from the background, levels of 255.
-    fn level(&self, k: usize) -> f64 {
-        f64::from(self.difference.levels[k])
-    }
-
-    /// Returns the difference as a share of the brightest channel of pixel and background, 0..=1.
-    ///
-    /// A shadow differs by more levels where the floor is brighter; the share stays equal.
-    fn share(&self, k: usize) -> f64 {
-        let seen = &self.difference.rgb.pixels[3 * k..3 * k + 3];
-        let px = self.background.px_in(self.difference.rect, k);
-        let back = &self.background.rgb.pixels[3 * px..3 * px + 3];
-        let brightest = seen
-            .iter()
-            .chain(back)
-            .fold(1, |most, &value| value.max(most));
-        self.level(k) / f64::from(brightest)
-    }
-
-    /// Returns whether a pixel differs much less from the background than the starkest pixels.
-    pub(super) fn is_faint(&self, k: usize) -> bool {
-        self.level(k) < FAINT_SHARE * self.starkest
-            || self.share(k) < FAINT_SHARE * self.starkest_share
-    }
-
-    /// Returns whether a pixel has the coat's color: it is much nearer to it than to the background.
-    pub(super) fn matches(&self, k: usize) -> bool {
-        let seen = &self.difference.rgb.pixels[3 * k..3 * k + 3];
-        let differences = seen.iter().zip(self.color);
-        let max_difference = differences.fold(0.0, |most, (&seen, color)| {
-            f64::max(most, (f64::from(seen) - color).abs())
-        });
-        max_difference < MATCH_SHARE * self.level(k)
-    }
-
-    /// Returns whether a faint pixel has the background's color, but darker.
-    pub(super) fn is_shadow(&self, k: usize) -> bool {
-        self.is_faint(k)
-            && !self.matches(k)
-            && shadow::has_darker_color(self.difference, self.background, k, SHADOW_BRIGHTNESS)
-    }
-
-    /// Returns whether a faint pixel cannot be told from the background.
-    fn is_floor(&self, k: usize) -> bool {
-        let px = self.background.px_in(self.difference.rect, k);
-        self.is_faint(k)
-            && !self.matches(k)
-            && self.difference.levels[k] <= self.background.weak_threshold(px)
-    }
-
-    /// Returns the mask without the soft shadow around the animal and without the floor between its parts.
-    ///
-    /// Pixels that the animal encloses stay, such as a white belly over a white floor. Pixels of the coat's
-    /// color stay too, such as black fur in front of a dark wall.
-    pub(super) fn without_halo(&self, mask: &Mask, band_px: u32) -> Mask {
-        let mut solid = mask.clone();
-        for (k, bit) in solid.bits.iter_mut().enumerate() {
-            *bit &= u8::from(!self.is_shadow(k) && !self.is_floor(k));
-        }
-        add_enclosed(&mut solid, 2 * band_px);
-        solid.majority()
+    /// Returns the logarithm of the ratio of likelihoods that a pixel shows the animal, and that it shows the
+    /// scene.
+    pub(super) fn log_odds(
+        &self,
+        difference: &Difference,
+        background: &Background,
+        k: usize,
+    ) -> f32 {
+        let color = color(difference, k);
+        let moved = self.scene.log_density(color) + libm::logf(MOVED_SHARE);
+        self.animal.log_density(color) - log_background(difference, background, k).max(moved)
     }
 }
 
-/// Sets the pixels that are enclosed by parts more than twice `reach_px` thick.
-///
-/// Thinner parts enclose nothing: a tail and its shadow may meet around a patch of floor.
-fn add_enclosed(solid: &mut Mask, reach_px: u32) {
-    let mut filled = solid.clone();
-    filled.fill_holes();
-    if filled == *solid {
-        return;
-    }
-    let mut thick = solid.eroded_by(reach_px);
-    thick.fill_holes();
-    for (bit, enclosed) in solid.bits.iter_mut().zip(thick.dilated_by(reach_px).bits) {
-        *bit |= enclosed;
-    }
+/// Returns the logarithm of the likelihood of a pixel's color under its background, in light or in shadow.
+fn log_background(difference: &Difference, background: &Background, k: usize) -> f32 {
+    let px = background.px_in(difference.rect, k);
+    let (seen, back) = (color(difference, k), background.color(px));
+    let variance = background.sigma[px].powi(2) + CODEC_NOISE.powi(2);
+    // Width of the distribution of a channel as a share of all levels.
+    let width = (std::f32::consts::TAU * variance).sqrt() / 256.0;
+    let log_density =
+        |off_squared: f32, volume: f32| -0.5 * off_squared / variance - libm::logf(volume);
+    let other = background.other.as_ref();
+    let sway = other.map_or([0.0; 3], |other| {
+        let at = &other.pixels[3 * px..3 * px + 3];
+        [0, 1, 2].map(|c| f32::from(at[c]) - back[c])
+    });
+    let sway_squared = dot(sway, sway);
+    let off = minus(seen, back);
+    let share = (dot(off, sway) / sway_squared.max(1.0)).clamp(0.0, 1.0);
+    let off = minus(off, sway.map(|c| share * c));
+    let length = width + sway_squared.sqrt() / 256.0;
+    let in_light = log_density(dot(off, off), width * width * length);
+    let light = dot(back, back);
+    let ratio = (dot(seen, back) / light.max(1.0)).clamp(MIN_SHADOW, 1.0);
+    let off = minus(seen, back.map(|c| ratio * c));
+    let length = width.max((1.0 - MIN_SHADOW) * light.sqrt() / 256.0);
+    let in_shadow = log_density(dot(off, off), width * width * length / SHADOW_SHARE);
+    in_light.max(in_shadow)
+}
+
+/// Returns the color of a pixel of the box, levels of 255.
+fn color(difference: &Difference, k: usize) -> [f32; 3] {
+    [0, 1, 2].map(|c| f32::from(difference.rgb.pixels[3 * k + c]))
+}
+
+pub(super) fn minus(p: [f32; 3], q: [f32; 3]) -> [f32; 3] {
+    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
+}
+
+pub(super) fn dot(p: [f32; 3], q: [f32; 3]) -> f32 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }

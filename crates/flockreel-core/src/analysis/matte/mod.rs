@@ -1,24 +1,25 @@
 //! Mattes: the animal cut out of a frame, with soft alpha and without the background's color.
 //!
-//! Alpha is 1 inside the silhouette. In a band around the outline, alpha is the pixel's share of the way from
-//! the background's color to the animal's color nearby. The background's share is then subtracted from the
-//! color. Shadows are left out, because a sprite would turn them with the body; `shadow` measures them.
-//! Mirror images are left out too (`ground`).
+//! The animal's pixels are those that its colors explain better than the background and its shadow do (`coat`,
+//! `cut`). Alpha is 1 inside. In a band around the outline, alpha is the pixel's share of the way from the
+//! background's color to the animal's color nearby. The background's share is then subtracted from the color.
+//! Shadows are left out, because a sprite would turn them with the body; `shadow` measures them.
 //!
 //! Values are encoded sRGB, as in the compositor. So a matte over its background reproduces the frame, except
-//! for shadows and mirror images. See docs/explanation/algorithms.md, "Mattes".
+//! for shadows. See docs/explanation/algorithms.md, "Mattes".
 
 mod coat;
+mod cut;
 mod given;
-mod ground;
 
-use self::coat::Coat;
-use self::ground::Ground;
+pub use self::coat::Coat;
+use self::coat::{dot, minus};
+use self::cut::Cut;
 use super::scene::background::Background;
 use super::scene::light::Light;
 use super::silhouette::{self, Difference};
 use crate::geometry::Rect;
-use crate::raster::{Frame, Mask, RgbaImage};
+use crate::raster::{Frame, Mask, RgbaImage, runs};
 
 /// The animal cut out of one frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,49 +30,65 @@ pub struct Matte {
     pub image: RgbaImage,
 }
 
+/// A frame, with all that the animal is told from its scene by.
+pub struct View<'a> {
+    /// The frame.
+    pub frame: &'a Frame,
+    /// The background.
+    pub background: &'a Background,
+    /// Light of the frame relative to the background.
+    pub light: &'a Light,
+    /// Colors of the animal and of the scene.
+    pub coat: &'a Coat,
+    /// Boxes to ignore.
+    pub ignored: &'a [Rect],
+}
+
+/// Width of the band along the outline whose pixels show animal and background, pixels. Free choice: lens and
+/// codec blur about as far.
+const BAND_PX: u32 = 2;
+/// Width of the floor around a silhouette in which parts of the animal are looked for, pixels. Free choice;
+/// it doubles while the animal reaches its border.
+pub const MARGIN_PX: u32 = 16;
+
 /// Returns the matte of a silhouette.
 ///
-/// `length_px` is the approximate length of the animal. The band along the outline is 2 % of it wide, 2 to 8
-/// pixels. When the frame has a given mask, its alpha is used.
-pub fn pull(
-    frame: &Frame,
-    background: &Background,
-    light: &Light,
-    silhouette: &Mask,
-    length_px: f64,
-) -> Matte {
+/// `length_px` is the approximate length of the animal; no part lies farther from the silhouette. When the
+/// frame has a given mask, its alpha is used.
+pub fn pull(view: &View, silhouette: &Mask, length_px: f64) -> Matte {
+    let frame = view.frame;
     if let Some(given) = &frame.mask {
         return given::pull(frame, given, silhouette);
     }
-    let band_px = ((0.02 * length_px).round() as u32).clamp(2, 8);
-    let rect = silhouette
-        .rect
-        .inflated(band_px + 1, frame.width, frame.height);
-    let difference = silhouette::difference(frame, background, light, rect);
-    let mask = over_box(silhouette, rect);
-    let on_ground = Ground::behind(&mask, background).part_of(&mask);
-    let coat_of = |mask: &Mask| Coat::measure(mask, &difference, background);
-    let coat = coat_of(&mask).or_starker(coat_of(&on_ground));
-    let mut solid = coat.without_halo(&mask, band_px);
-    let ground = Ground::behind(&solid, background);
-    let images = ground.clear_fading_images(&mut solid, &mask, &coat);
-    ground.clear_separate_images(&mut solid, &images, &coat);
-    let inside = solid.eroded_by(band_px);
-    let outer = mask.dilated_by(band_px);
-    let mut without_gaps = solid.dilated_by(MAX_GAP_PX).eroded_by(MAX_GAP_PX);
-    without_gaps.add(&solid);
+    let background = view.background;
+    let mut margin_px = MARGIN_PX;
+    let (difference, solid) = loop {
+        let rect = (silhouette.rect).inflated(margin_px, frame.width, frame.height);
+        let mut difference = silhouette::difference(frame, background, view.light, rect);
+        (view.ignored.iter()).for_each(|ignored| difference.clear(*ignored));
+        let cut = Cut {
+            difference: &difference,
+            background,
+            coat: view.coat,
+            silhouette: &over_box(silhouette, rect),
+        };
+        let solid = cut.animal(2 * BAND_PX);
+        margin_px *= 2;
+        if !reaches_edge(&solid, frame) || f64::from(margin_px) > length_px {
+            break (difference, solid);
+        }
+    };
+    let rect = difference.rect;
+    let inside = solid.eroded_by(BAND_PX);
+    let outer = solid.dilated_by(BAND_PX);
     let puller = MattePuller {
         difference: &difference,
         background,
-        mask: &mask,
         solid: &solid,
         inside: &inside,
         broad: &solid.eroded().dilated_by(2),
-        without_gaps: &without_gaps,
-        coat: &coat,
         nearest_inside: nearest_set(&inside, &outer),
         nearest_solid: nearest_set(&solid, &outer),
-        band_px,
     };
     let mut image = RgbaImage::new(rect.w, rect.h);
     for (k, pixel) in image.pixels.chunks_exact_mut(4).enumerate() {
@@ -85,7 +102,43 @@ pub fn pull(
         };
         pixel.copy_from_slice(&rgba);
     }
-    Matte { rect, image }
+    cropped(rect, &image)
+}
+
+/// Returns whether a mask reaches an edge of its box that is none of the frame.
+fn reaches_edge(mask: &Mask, frame: &Frame) -> bool {
+    let (rect, w, h) = (mask.rect, mask.width(), mask.height());
+    let is_set = |x: usize, y: usize| mask.bits[y * w + x] == 1;
+    let side = |x: usize| (0..h).any(|y| is_set(x, y));
+    let row = |y: usize| (0..w).any(|x| is_set(x, y));
+    rect.x > 0 && side(0)
+        || rect.y > 0 && row(0)
+        || rect.right() < frame.width && side(w - 1)
+        || rect.bottom() < frame.height && row(h - 1)
+}
+
+/// Returns the matte in the smallest box with all its pixels that are not transparent.
+fn cropped(rect: Rect, image: &RgbaImage) -> Matte {
+    let bits = image
+        .pixels
+        .chunks_exact(4)
+        .map(|rgba| u8::from(rgba[3] > 0));
+    let bits = Mask {
+        rect,
+        bits: bits.collect(),
+    };
+    let pieces = runs::components(&bits);
+    let own = pieces
+        .iter()
+        .fold(Rect::default(), |own, piece| own.union(&piece.rect));
+    let mut pixels = Vec::with_capacity(4 * own.area() as usize);
+    for y in own.y..own.bottom() {
+        let first = 4 * ((y - rect.y) * rect.w + own.x - rect.x) as usize;
+        pixels.extend_from_slice(&image.pixels[first..first + 4 * own.w as usize]);
+    }
+    let mut image = RgbaImage::new(own.w, own.h);
+    image.pixels = pixels;
+    Matte { rect: own, image }
 }
 
 /// Returns the mask over another box, clear outside the old one.
@@ -143,36 +196,19 @@ fn nearest_set(mask: &Mask, wanted: &Mask) -> Vec<u32> {
     rows.flat_map(|row| row[1..=w].iter().copied()).collect()
 }
 
-/// Half the width of gaps in the silhouette that count as narrow, pixels. A wire across the animal leaves
-/// one.
-const MAX_GAP_PX: u32 = 2;
-
-/// Properties of the animal near a pixel of the band.
-struct NearbyAnimal {
-    /// The animal's color, levels of 255.
-    color: [f32; 3],
-    /// Whether the pixel has the background's color with less light.
-    is_shadow: bool,
-}
-
 struct MattePuller<'a> {
     difference: &'a Difference,
     background: &'a Background,
-    mask: &'a Mask,
-    /// The silhouette without the shadow around it.
+    /// The pixels that show the animal.
     solid: &'a Mask,
     /// The solid part without the band along its outline, where alpha is 1.
     inside: &'a Mask,
     /// The solid part where it is at least 3 pixels broad, and the pixels next to it.
     broad: &'a Mask,
-    /// The solid part with its narrow gaps closed.
-    without_gaps: &'a Mask,
-    coat: &'a Coat<'a>,
     /// Index of an inside pixel near each pixel, or [`NONE_NEAR`].
     nearest_inside: Vec<u32>,
     /// Index of a solid pixel near each pixel, or [`NONE_NEAR`].
     nearest_solid: Vec<u32>,
-    band_px: u32,
 }
 
 impl MattePuller<'_> {
@@ -183,7 +219,7 @@ impl MattePuller<'_> {
 
     /// Returns the index of a pixel in the background image.
     fn background_px(&self, k: usize) -> usize {
-        self.background.px_in(self.mask.rect, k)
+        self.background.px_in(self.solid.rect, k)
     }
 
     fn background_color(&self, k: usize) -> [f32; 3] {
@@ -192,27 +228,21 @@ impl MattePuller<'_> {
 
     /// Returns the straight color and the alpha of a pixel of the band.
     fn band_pixel(&self, k: usize) -> [u8; 4] {
-        let Some(NearbyAnimal { color, is_shadow }) = self.nearby(k) else {
+        let Some(color) = self.color_nearby(k) else {
             return [0; 4];
-        };
-        let max_alpha = if is_shadow {
-            self.blurred_solid(k)
-        } else {
-            1.0
         };
         let alpha = self
             .alpha_by_color(color, k)
-            .unwrap_or_else(|| self.alpha_without_contrast(k))
-            .min(max_alpha);
+            .unwrap_or_else(|| self.alpha_without_contrast(k));
         let alpha = match self.thin_part_color(k) {
-            Some(body) if !is_shadow => self.alpha_of_thin_part(alpha, body, k),
+            Some(body) => self.alpha_of_thin_part(alpha, body, k),
             _ => alpha,
         };
         let level = (alpha * 255.0 + 0.5) as u8;
         if level == 0 {
             return [0; 4];
         }
-        let color = if !is_shadow && alpha <= 0.2 {
+        let color = if alpha <= 0.2 {
             color
         } else {
             let (back, seen) = (self.background_color(k), self.frame_color(k).map(f32::from));
@@ -271,29 +301,23 @@ impl MattePuller<'_> {
     }
 
     /// Returns the animal's color near a pixel of the band; `None` outside the band.
-    ///
-    /// Pixels in narrow gaps of the animal never count as shadow.
-    fn nearby(&self, k: usize) -> Option<NearbyAnimal> {
-        let band = self.band_px as usize;
+    fn color_nearby(&self, k: usize) -> Option<[f32; 3]> {
+        let band = BAND_PX as usize;
         let solid = self.nearest_solid[k];
         if solid == NONE_NEAR || self.steps(k, solid as usize) > band {
             return None;
         }
         let inside = self.nearest_inside[k];
-        let color = if inside != NONE_NEAR && self.steps(k, inside as usize) <= 2 * band + 1 {
-            self.mean_inside(inside as usize)
+        if inside != NONE_NEAR && self.steps(k, inside as usize) <= 2 * band + 1 {
+            Some(self.mean_inside(inside as usize))
         } else {
-            self.starkest(solid as usize)?
-        };
-        Some(NearbyAnimal {
-            color,
-            is_shadow: self.without_gaps.bits[k] == 0 && self.coat.is_shadow(k),
-        })
+            self.starkest(solid as usize)
+        }
     }
 
     /// Returns the number of steps from one pixel to another (8-connected).
     fn steps(&self, from: usize, to: usize) -> usize {
-        let width = self.mask.width();
+        let width = self.solid.width();
         let along_x = (from % width).abs_diff(to % width);
         along_x.max((from / width).abs_diff(to / width))
     }
@@ -344,22 +368,14 @@ impl MattePuller<'_> {
     }
 
     fn xy(&self, k: usize) -> [i64; 2] {
-        let width = self.mask.width();
+        let width = self.solid.width();
         [k % width, k / width].map(|at| at as i64)
     }
 
     fn at(&self, x: i64, y: i64) -> Option<usize> {
-        let (w, h) = (i64::from(self.mask.rect.w), i64::from(self.mask.rect.h));
+        let (w, h) = (i64::from(self.solid.rect.w), i64::from(self.solid.rect.h));
         ((0..w).contains(&x) && (0..h).contains(&y)).then_some((y * w + x) as usize)
     }
-}
-
-fn minus(p: [f32; 3], q: [f32; 3]) -> [f32; 3] {
-    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
-}
-
-fn dot(p: [f32; 3], q: [f32; 3]) -> f32 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
 #[cfg(test)]

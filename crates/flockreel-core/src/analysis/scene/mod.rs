@@ -9,6 +9,7 @@
 //!    Where a background shows the resting animal, only samples without the animal count there.
 //! 5. `refusal` rejects footage that cannot become a library, before any frame is tracked.
 
+use super::matte::{self, Coat};
 use super::silhouette;
 use super::subject::Subject;
 use super::{Error, Params};
@@ -62,6 +63,8 @@ pub struct Scene {
     samples: Vec<(usize, Option<usize>)>,
     /// Typical appearance of the animal in the samples.
     pub subject: Subject,
+    /// Colors of the animal and of the scene around it.
+    pub coat: Coat,
     /// Half the width below which a part of the animal's component counts as thin, pixels. `None` where no
     /// tether leads away from the animal.
     pub tether_px: Option<u32>,
@@ -97,8 +100,15 @@ impl Scene {
         similar_objects: SimilarObjects,
     ) -> Result<Scene, Error> {
         let survey = Survey::new(samples, &estimate.of_samples());
+        let is_cut_off =
+            survey.tether_px.is_some() || matches!(similar_objects, SimilarObjects::MirrorImage(_));
+        let coat = Coat::learn(
+            &survey.animals_seen(samples, &estimate.of_samples(), matte::MARGIN_PX),
+            !is_cut_off,
+        );
         let frames = samples.frame_idx.iter().copied();
         Ok(Scene {
+            coat,
             still_px: estimate
                 .still_parts
                 .iter()

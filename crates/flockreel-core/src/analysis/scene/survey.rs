@@ -13,11 +13,11 @@ use super::light::Light;
 use super::samples::Samples;
 use super::scenery;
 use crate::analysis::silhouette::cast_shadow::{self, Lump};
-use crate::analysis::silhouette::{self, shadow, tether};
+use crate::analysis::silhouette::{self, Difference, shadow, tether};
 use crate::analysis::subject::{Color, Look, MIN_AREA_PX, Subject, touches_border};
 use crate::order;
-use crate::raster::Frame;
 use crate::raster::runs::{Component, Run};
+use crate::raster::{Frame, Mask};
 
 /// Number of components kept per sample, largest first; further ones are noise. Free choice.
 const MAX_COMPONENTS: usize = 24;
@@ -82,6 +82,24 @@ impl Survey {
             tether_px: Some(thin_px),
             ..Survey::from_components(without_tether.collect(), samples, backgrounds)
         }
+    }
+
+    /// Returns each sample around the animal, with its background and the animal's silhouette in the same box.
+    pub(super) fn animals_seen<'a>(
+        &self,
+        samples: &Samples,
+        backgrounds: &[Option<&'a Background>],
+        margin_px: u32,
+    ) -> Vec<(Difference, &'a Background, Mask)> {
+        let [width, height] = samples.size_px();
+        let seen = |k: usize| {
+            let (background, component) = (backgrounds[k]?, &self.components[k][self.animal[k]?]);
+            let rect = component.rect.inflated(margin_px, width, height);
+            let (frame, light) = (&samples.frames[k], Light::NEUTRAL);
+            let difference = silhouette::difference(frame, background, &light, rect);
+            Some((difference, background, component.mask(rect)))
+        };
+        (0..samples.frames.len()).filter_map(seen).collect()
     }
 
     fn from_components(

@@ -87,7 +87,7 @@ pub struct Difference {
 
 impl Difference {
     /// Sets the levels inside `ignored` to 0.
-    fn clear(&mut self, ignored: Rect) {
+    pub(super) fn clear(&mut self, ignored: Rect) {
         let common = self.rect.intersection(&ignored);
         if common.is_empty() {
             return;

@@ -24,6 +24,7 @@ mod stretch;
 use self::movers::MoverSighting;
 use self::sighting::{CandidateShape, FrameView, Sighting};
 use self::stretch::Candidate;
+use super::matte;
 use super::params::Follow;
 use super::read_ahead::Batches;
 use super::scene::{Placed, Scene};
@@ -227,10 +228,13 @@ fn compare(
     let components = components(frame, &placed, scene, &ignored);
     let (described, movers) = described(components, frame, &placed, scene);
     let view = FrameView {
-        frame,
-        background: placed.background,
-        light: &placed.light,
-        ignored: &ignored,
+        view: matte::View {
+            frame,
+            background: placed.background,
+            light: &placed.light,
+            coat: &scene.coat,
+            ignored: &ignored,
+        },
         keeps_surroundings: !scene.is_masked && frame_idx.is_multiple_of(SURROUNDINGS_EVERY),
     };
     let mut candidates = Vec::with_capacity(described.len());

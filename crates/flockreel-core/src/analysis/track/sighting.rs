@@ -7,12 +7,10 @@ use super::body;
 use super::evidence;
 use crate::analysis::matte;
 use crate::analysis::pose::moments::{self, Moments};
-use crate::analysis::scene::background::Background;
-use crate::analysis::scene::light::Light;
 use crate::analysis::{silhouette, subject};
 use crate::geometry::Rect;
 use crate::raster::runs::Component;
-use crate::raster::{Frame, Mask, RgbaImage};
+use crate::raster::{Mask, RgbaImage};
 use crate::scratch::{Full, Scratch};
 
 /// The animal in one frame.
@@ -105,16 +103,10 @@ pub struct CandidateShape {
     pub silhouette: Mask,
 }
 
-/// A frame with the background to compare it with.
+/// A frame in which animals are cut out.
 pub struct FrameView<'a> {
-    /// The frame.
-    pub frame: &'a Frame,
-    /// The background.
-    pub background: &'a Background,
-    /// Light of the frame relative to the background.
-    pub light: &'a Light,
-    /// Boxes to ignore.
-    pub ignored: &'a [Rect],
+    /// The frame and its scene.
+    pub view: matte::View<'a>,
     /// Whether to store the animal's surroundings.
     pub keeps_surroundings: bool,
 }
@@ -129,13 +121,7 @@ impl FrameView<'_> {
         let rect = shape.component.rect;
         let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
         let silhouette = &shape.silhouette;
-        let matte = matte::pull(
-            self.frame,
-            self.background,
-            self.light,
-            silhouette,
-            length_px,
-        );
+        let matte = matte::pull(&self.view, silhouette, length_px);
         let Some(measured) = Sighting::measured(matte.rect, &matte.image) else {
             return Ok(None);
         };
@@ -145,9 +131,9 @@ impl FrameView<'_> {
         Ok(Some(Sighting {
             at: scratch.put(&matte.image.pixels)?,
             edge_share: evidence::edge_share(
-                self.frame,
-                self.background,
-                self.light,
+                self.view.frame,
+                self.view.background,
+                self.view.light,
                 &solid(matte.rect, &matte.image),
             ),
             box_px: rect,
@@ -165,18 +151,20 @@ impl FrameView<'_> {
         margin_px: u32,
         scratch: &dyn Scratch,
     ) -> Result<Surroundings, Full> {
-        let rect = rect.inflated(margin_px, self.frame.width, self.frame.height);
-        let seen = silhouette::difference(self.frame, self.background, self.light, rect).rgb;
+        let rect = rect.inflated(margin_px, self.view.frame.width, self.view.frame.height);
+        let seen =
+            silhouette::difference(self.view.frame, self.view.background, self.view.light, rect)
+                .rgb;
         let at = scratch.put(&seen.pixels)?;
         Ok(Surroundings { rect, at })
     }
 
     /// Returns whether a box touches the border of the frame or an ignored box.
     fn cuts(&self, rect: Rect) -> bool {
-        let (width, height) = (self.frame.width, self.frame.height);
+        let (width, height) = (self.view.frame.width, self.view.frame.height);
         let around = rect.inflated(1, width, height);
         let meets = |ignored: &Rect| !ignored.intersection(&around).is_empty();
-        subject::touches_border(rect, [width, height]) || self.ignored.iter().any(meets)
+        subject::touches_border(rect, [width, height]) || self.view.ignored.iter().any(meets)
     }
 }
 

@@ -43,33 +43,6 @@ fn image_too_large_for_a_limb_is_left_out() {
     }
 }
 
-/// A body that ends at the wall, and a small image in the wall.
-///
-/// The image is as dark as the body in its middle and fades over ten pixels.
-fn with_a_small_image(x: u32, y: u32) -> u8 {
-    let middle = Rect {
-        x: 75,
-        y: 31,
-        w: 3,
-        h: 3,
-    };
-    let faded = steps_away([x, y], middle).min(10) as u8;
-    match steps_away([x.saturating_sub(10), y], BODY) {
-        0 => FUR,
-        _ if wall(x, y) == WALL => FUR + (WALL - FUR) / 10 * faded,
-        _ => wall(x, y),
-    }
-}
-
-#[test]
-fn fading_image_is_left_out_however_dark_its_middle() {
-    let drawn = drawn_on(wall, with_a_small_image);
-    assert_eq!(drawn.pixel(50, 33)[3], 255, "the body");
-    for (x, y) in (31..34).flat_map(|y| (75..78).map(move |x| (x, y))) {
-        assert_eq!(drawn.pixel(x, y)[3], 0, "{x}, {y}");
-    }
-}
-
 /// Nearly black, slightly lighter on the left.
 fn nearly_black(x: u32, _: u32) -> u8 {
     if x < 62 { 4 } else { 1 }

@@ -44,13 +44,17 @@ fn drawn_on(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Drawn {
             u8::from(ground(k % width, k / width).abs_diff(shade(k % width, k / width)) > 9);
     }
     silhouette.fill_holes();
-    let matte = pull(
-        &picture(shade),
-        &background,
-        &Light::NEUTRAL,
-        &silhouette,
-        60.0,
-    );
+    let frame = picture(shade);
+    let difference = silhouette::difference(&frame, &background, &Light::NEUTRAL, silhouette.rect);
+    let coat = Coat::learn(&[(difference, &background, silhouette.clone())], true);
+    let view = View {
+        frame: &frame,
+        background: &background,
+        light: &Light::NEUTRAL,
+        coat: &coat,
+        ignored: &[],
+    };
+    let matte = pull(&view, &silhouette, 60.0);
     Drawn { matte, shade }
 }
 
@@ -100,7 +104,7 @@ const BODY: Rect = Rect {
 fn with_shadow(x: u32, y: u32) -> u8 {
     match steps_away([x, y], BODY) {
         0 => FUR,
-        d => PAPER - 38u8.saturating_sub(3 * (d.min(20) - 1) as u8),
+        d => PAPER - 38u8.saturating_sub(9 * (d.min(6) - 1) as u8),
     }
 }
 
@@ -193,7 +197,7 @@ fn with_two_shadows(x: u32, y: u32) -> u8 {
     let is_along = (60..105).contains(&x);
     match (steps_away([x, y], BODY), y) {
         (0, _) => FUR,
-        (_, 31..35) if is_along => floor / 2,
+        (_, 31..35) if is_along => floor / 4,
         (_, 22..26 | 40..44) if is_along => (f32::from(floor) * 0.82) as u8,
         _ => floor,
     }
@@ -251,7 +255,7 @@ fn with_a_loop(x: u32, y: u32) -> u8 {
     match (steps_away([x, y], BODY), steps_away([x, y], LOOP)) {
         (0, _) => 200,
         (_, 1..=3) => 120,
-        (_, 0) => 9,
+        (_, 0) => 4,
         _ => 0,
     }
 }

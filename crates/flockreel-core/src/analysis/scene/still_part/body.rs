@@ -3,7 +3,7 @@
 use super::cut;
 use super::marks::{Colors, color_of};
 use super::outline::contrast;
-use super::palette::Palette;
+use crate::analysis::palette::Palette;
 use crate::geometry::Rect;
 use crate::raster::runs::{self, Component};
 use crate::raster::{Mask, RgbImage};

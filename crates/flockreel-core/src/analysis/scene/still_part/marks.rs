@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::grid::Grid;
 use super::outline::{self, Point};
-use super::palette::Palette;
+use crate::analysis::palette::Palette;
 use crate::analysis::scene::background::Background;
 use crate::analysis::scene::samples::Samples;
 use crate::analysis::scene::survey::Survey;

@@ -13,7 +13,6 @@ mod cut;
 mod grid;
 mod marks;
 mod outline;
-mod palette;
 
 use self::grid::Grid;
 use self::marks::Marks;

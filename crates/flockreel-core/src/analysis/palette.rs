@@ -5,36 +5,45 @@ const N_BINS: usize = 16;
 
 /// Histogram of RGB colors, smoothed over neighboring bins.
 pub(super) struct Palette {
-    /// Density of each bin relative to that of even colors.
-    density: Vec<f32>,
+    /// Logarithm of the density of each bin relative to that of even colors.
+    log_density: Vec<f32>,
 }
 
 impl Palette {
     /// Returns the palette of colors, levels of 255. Rare and unseen colors have a small density.
     pub(super) fn new(colors: impl Iterator<Item = [f32; 3]>) -> Palette {
+        Palette::weighted(colors.map(|color| (color, 1.0)))
+    }
+
+    /// Returns the palette of colors that count by weights, 0..=1.
+    pub(super) fn weighted(colors: impl Iterator<Item = ([f32; 3], f32)>) -> Palette {
         let mut counts = vec![0f32; N_BINS * N_BINS * N_BINS];
         let mut n = 0.0;
-        for color in colors {
-            counts[bin(color)] += 1.0;
-            n += 1.0;
+        for (color, weight) in colors {
+            counts[bin(color)] += weight;
+            n += weight;
         }
         for stride in [1, N_BINS, N_BINS * N_BINS] {
             counts = blurred(&counts, stride);
         }
         // One even color in a hundred keeps the ratio of two palettes finite.
-        let even = 0.01 / counts.len() as f32;
-        let density = counts
+        let per_count = 0.99 * counts.len() as f32 / f32::max(n, 1.0);
+        let log_density = counts
             .iter()
-            .map(|count| 0.99 * count / f32::max(n, 1.0) + even);
+            .map(|count| libm::logf(per_count * count + 0.01));
         Palette {
-            density: density.collect(),
+            log_density: log_density.collect(),
         }
+    }
+
+    /// Returns the logarithm of a color's density relative to that of even colors.
+    pub(super) fn log_density(&self, color: [f32; 3]) -> f32 {
+        self.log_density[bin(color)]
     }
 
     /// Returns the logarithm of the ratio of a color's densities in this palette and in `other`.
     pub(super) fn log_ratio(&self, other: &Palette, color: [f32; 3]) -> f32 {
-        let at = bin(color);
-        libm::logf(self.density[at] / other.density[at])
+        self.log_density(color) - other.log_density(color)
     }
 }
 
