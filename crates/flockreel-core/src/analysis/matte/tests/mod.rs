@@ -116,6 +116,7 @@ fn shadow_is_no_part_of_the_matte() {
         match steps_away([x, y], BODY) {
             0 => assert_eq!(alpha, 255, "the body at {x}, {y}"),
             1 => {}
+            2 => assert!(alpha < 70, "beside the body at {x}, {y}: {alpha}"),
             _ => assert!(alpha < 8, "its shadow at {x}, {y}: {alpha}"),
         }
     }
