@@ -36,9 +36,11 @@ pub fn rule_off(name: &str) -> bool {
 """
 # Films and the seconds of them that are analyzed.
 CASES = {"title_card-3002": 6, "camera_bump-3002": 10, "lights_dim-3002": 10, "infrared-3002": 10, "mains_banding-3002": 5,
-         "resting_animal-3002": 10, "hand_at_start-3002": 6, "tether-3002": 5, "surface_mirror-3002": 6, "large_animal-3022": 5,
-         "hard-2": 6, "silver-3": 6, "station-2": 8, "cast_shadow-1": 8, "plants-2": 10, "shoal-1": 6, "pecking-1": 8, "ripple-3": 8}
-CLIPS = {"mouse_round_arena": 15, "mouse_homecage_bedding": 10, "dog_side_with_hand": 10, "zebrafish_juvenile_single": 8}
+         "resting_animal-3002": 10, "hand_at_start-3002": 6, "tether-3002": 5, "surface_mirror-3002": 10, "large_animal-3022": 5,
+         "silver-3": 6, "station-2": 8, "cast_shadow-1": 8, "plants-2": 8, "shoal-1": 6, "pecking-1": 8, "ripple-3": 8}
+CLIPS = {"mouse_round_arena": 12, "mouse_homecage_bedding": 10, "zebrafish_juvenile_single": 8}
+# The film whose camera and animal are known to the program, so that it measures directions in space.
+CALIBRATED = "silver-3"
 # Smallest change of a film's score that counts, points of 100 or degrees. A refusal always counts. Free choice.
 CLEARLY = 1.0
 
@@ -85,7 +87,8 @@ def mattes_halo(library):
     """Returns the share of alpha that is far outside the contour of the mattes."""
     with zipfile.ZipFile(library / "mattes.zip") as archive:
         pictures = (cv2.imdecode(np.frombuffer(archive.read(name), np.uint8), cv2.IMREAD_UNCHANGED) for name in archive.namelist())
-        return halo([rgba[..., 3] for rgba in pictures if rgba is not None and rgba.ndim == 3 and rgba.shape[2] == 4 and rgba[..., 3].any()])
+        alphas = [rgba[..., 3] for rgba in pictures if rgba is not None and rgba.ndim == 3 and rgba.shape[2] == 4]
+        return halo([alpha for alpha in alphas if alpha.any()])
 
 
 def direction_deg(poses, truth):
@@ -100,20 +103,21 @@ def measure(program, film, rule):
 
     `reads` are the rules whose switches were read, if `rule` is "none".
     """
-    name, path, flags, known, masks = film
-    with analyzed(program, path, *flags, environment={**os.environ, "FLOCKREEL_RULE_OFF": rule}) as run:
+    name, path, flags, known, masks, seconds = film
+    with analyzed(program, path, "--to", seconds, *flags, environment={**os.environ, "FLOCKREEL_RULE_OFF": rule}) as run:
         points = {"reads": sorted({line.split()[-1] for line in run.said.splitlines() if line.startswith("reads the switch ")})}
         if run.refused:
             return {**points, "refused": run.refused}
         poses = run.poses
         points["halo"] = -100 * (mattes_halo(run.library) or 0)
         if "clip" in known:
-            known = {**known, "frames": [row for row in known["frames"] if row["frame"] < len(poses["frames"])]}
+            known = {**known, "frames": [row for row in known["frames"] if row["frame"] < seconds * poses["fps"]]}
             score = score_labels(poses, known)
             right = (score["found"] - score["far"]) / score["n"]
             heads = 1 - len(score["heads_wrong"]) / max(score["heads_told"], 1)
             points["view"] = 100.0 * score["view_right"]
         else:
+            known = {**known, "frames": known["frames"][:round(seconds * poses["fps"])]}
             score, _, _ = score_case(poses, known)
             right = score["found"] * score["right"] - score["invented"] / score["n"]
             heads = 1 - score["flips"] / max(score["n_aside"], 1)
@@ -121,7 +125,7 @@ def measure(program, film, rule):
                        "view": 100.0 * (poses["view"] == "side"), "direction": -direction_deg(poses, known)}
             if masks.exists():
                 shown = np.load(masks)
-                shown = {k: mask for k, mask in zip(shown["frames"].tolist(), shown["masks"]) if k < len(poses["frames"])}
+                shown = {k: mask for k, mask in zip(shown["frames"].tolist(), shown["masks"]) if k < len(known["frames"])}
                 points["overlap"] = 100 * statistics.median(overlaps(run.mattes(), shown).values())
         return {**points, "right": 100 * right, "heads": 100 * heads, "animals": -100.0 * ("several_animals" in run.said)}
 
@@ -155,8 +159,8 @@ def page(results):
                 named = ", ".join(f"{film} {loss:.0f}" for film, loss in losses.items() if abs(loss) > CLEARLY)
                 rows.append((f"`{name}`", rule["says"], verdict(losses), named))
     return ["## Contribution of each rule", "",
-            "Each rule of `bench/ablation.toml` is switched off, one at a time. The last column has the points of 100 that a film loses without it, "
-            "if more than one; negative points are gains. Points count frames within 0.1 body lengths, frames that are sure and far "
+            "Each rule of `bench/ablation.toml` is switched off, one at a time. The last column has the points of 100 that a film "
+            "loses without it, if more than one; negative points are gains. Points count frames within 0.1 body lengths, frames that are sure and far "
             "off, false steps, heads at the right end, the view, the overlap and the halo of mattes; degrees of the direction in "
             "space count like points. A refusal is 100. The verdict is `useful` from two films on, and `doubtful` if a film gains.", "",
             "Repeat: `make ablation GENERATOR=goldfish.py FOOTAGE=folder`", "", *table(["rule", "meaning", "verdict", "films"], rows)]
@@ -178,7 +182,7 @@ def main():
     kept.mkdir(parents=True, exist_ok=True)
 
     def measured(film, rule):
-        file = kept / f"{rule}-{film[0]}.json"
+        file = kept / f"{rule}-{film[0]}-{film[-1]}.json"
         if not file.exists():
             file.write_text(json.dumps(measure(program, film, rule)))
         return json.loads(file.read_text())
@@ -196,13 +200,18 @@ def main():
 
 
 def films_of(args):
-    """Returns (name, path, flags of analyze, truth or labels, path of the masks) for each film."""
+    """Returns (name, path, flags of analyze, truth or labels, path of the masks, seconds) for each film."""
     films = []
-    for name, path, truth, flags, _ in cases.films(args.generator, args.films, CASES):
-        films.append((name, path, [*flags, "--to", str(CASES[name])], json.loads(truth.read_text()), args.films / f"{name}.masks.npz"))
+    for name, path, truth_path, flags, _ in cases.films(args.generator, args.films, CASES):
+        truth, masks = json.loads(truth_path.read_text()), args.films / f"{name}.masks.npz"
+        if name == CALIBRATED:
+            camera, animal = PLACE / f"{name}.camera.json", truth["animal"]
+            camera.write_text(json.dumps({key: truth["camera"][key] for key in ("z_min_m", "pane_px_per_m")}))
+            flags = [*flags, "--camera", camera, "--animal-length", animal["length_m"], "--animal-height", animal["height_m"]]
+        films.append((name, path, flags, truth, masks, CASES[name]))
     for clip, seconds in CLIPS.items() if args.footage else []:
         labels = json.loads((HERE / "labels" / f"{clip}.json").read_text())
-        films.append((clip, args.footage / labels["clip"], ["--to", str(seconds)], labels, None))
+        films.append((clip, args.footage / labels["clip"], [], labels, None, seconds))
     return films
 
 
