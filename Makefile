@@ -145,8 +145,8 @@ bench: build target/bench-venv/ready ## measure the speed against ffmpeg, OpenCV
 measure: accuracy flocks papers service hostile transitions page-bench ## write docs/measurements.md: make measure GENERATOR=goldfish.py FOOTAGE=folder
 	$(BENCH) bench/measurements.py
 
-accuracy: build target/bench-venv/ready ## compare poses with the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program]
-	$(BENCH) bench/accuracy.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE)) $(if $(AGAINST),--against $(AGAINST))
+accuracy: build target/bench-venv/ready ## compare poses with the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program] [ONLY=shoal,plants-2]
+	$(BENCH) bench/accuracy.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE)) $(if $(AGAINST),--against $(AGAINST)) $(if $(ONLY),--only $(ONLY))
 
 flocks: build target/bench-venv/ready ## compare flocks with the films of their animals: make flocks GENERATOR=goldfish.py [FOOTAGE=folder]
 	$(BENCH) bench/flocks.py $(RELEASE) $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
@@ -179,8 +179,8 @@ count: ## count lines, constants and imports by module: make count [WRITE=1]
 	@$(if $(WRITE),$(MAKE) --no-print-directory target/bench-venv/ready)
 	@$(if $(WRITE),$(BENCH),python3) -B bench/count.py $(if $(WRITE),--write)
 
-ablation: target/vendor target/bench-venv/ready ## switch off each rule of the measurement once: make ablation GENERATOR=goldfish.py [FOOTAGE=folder]
-	$(BENCH) bench/ablation.py $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE))
+ablation: target/vendor target/bench-venv/ready ## switch off each rule of the measurement once: make ablation GENERATOR=goldfish.py [FOOTAGE=folder] [JOBS=1]
+	$(BENCH) bench/ablation.py $(GENERATOR) $(if $(FOOTAGE),--footage $(FOOTAGE)) $(if $(JOBS),--jobs $(JOBS))
 
 vendor: ## build the page's libraries from web/package-lock.json
 	@scripts/vendor.sh

@@ -1,18 +1,19 @@
 #!/usr/bin/env python3
 """Measures what each rule of the measurement contributes, by switching off one rule at a time on a few films.
 
-    ablation.py GENERATOR [--footage FOLDER] [--films FOLDER]
+    ablation.py GENERATOR [--footage FOLDER] [--films FOLDER] [--jobs N]
 
-One program is built from a copy of the sources in which every rule of ablation.toml has a switch. The films
-are those of cases.py and the first seconds of labeled recordings. Scores are kept in target/ablation for as
-long as the program is unchanged. Writes bench/results/ablation.json and its section of docs/measurements.md.
+One program is built from a copy of the sources in which every rule of ablation.toml has a switch. It reports which
+switches a film reads, and a rule is tried on these films only. The films are the first seconds of films of cases.py
+and of labeled recordings. Scores are kept in target/ablation for as long as the program is unchanged, so an
+interrupted run goes on where it was. Writes bench/results/ablation.json and its section of docs/measurements.md.
 """
-import argparse, concurrent.futures, hashlib, json, os, pathlib, re, shutil, subprocess, tempfile, tomllib, zipfile
+import argparse, concurrent.futures, hashlib, json, math, os, pathlib, re, shutil, statistics, subprocess, tomllib, zipfile
 
 import cv2
 import numpy as np
 
-from accuracy import score_case, score_labels
+from accuracy import analyzed, overlaps, quantile, score_case, score_labels
 import cases
 from flocks import halo
 from table import table
@@ -26,13 +27,21 @@ SWITCH = """
 #[doc(hidden)]
 pub fn rule_off(name: &str) -> bool {
     static OFF: std::sync::OnceLock<String> = std::sync::OnceLock::new();
-    OFF.get_or_init(|| std::env::var("FLOCKREEL_RULE_OFF").unwrap_or_default()) == name
+    let off = OFF.get_or_init(|| std::env::var("FLOCKREEL_RULE_OFF").unwrap_or_default());
+    if off == "none" {
+        eprintln!("reads the switch {name}");
+    }
+    off == name
 }
 """
-CASES = ("title_card-3002", "camera_bump-3002", "lights_dim-3002", "infrared-3002", "mains_banding-3002", "resting_animal-3002",
-         "hand_at_start-3002", "tether-3002", "surface_mirror-3002", "large_animal-3022", "hard-2", "silver-3")
-CLIPS = {"mouse_round_arena": 20, "mouse_homecage_bedding": 12, "dog_side_with_hand": 10, "zebrafish_juvenile_single": 10}
-# Smallest change of a film's score that counts, points of 100. A refusal always counts. Free choice.
+# Films and the seconds of them that are analyzed.
+CASES = {"title_card-3002": 6, "camera_bump-3002": 10, "lights_dim-3002": 10, "infrared-3002": 10, "mains_banding-3002": 5,
+         "resting_animal-3002": 10, "hand_at_start-3002": 6, "tether-3002": 5, "surface_mirror-3002": 10, "large_animal-3022": 5,
+         "silver-3": 6, "station-2": 8, "cast_shadow-1": 8, "plants-2": 8, "shoal-1": 6, "pecking-1": 8, "ripple-3": 8}
+CLIPS = {"mouse_round_arena": 12, "mouse_homecage_bedding": 10, "zebrafish_juvenile_single": 8}
+# The film whose camera and animal are known to the program, so that it measures directions in space.
+CALIBRATED = "silver-3"
+# Smallest change of a film's score that counts, points of 100 or degrees. A refusal always counts. Free choice.
 CLEARLY = 1.0
 
 
@@ -66,52 +75,66 @@ def lay_out(rules):
 
 
 def build():
-    environment = {**os.environ, "CARGO_TARGET_DIR": str(PLACE / "target"), "CARGO_PROFILE_RELEASE_LTO": "off",
-                   "CARGO_PROFILE_RELEASE_DEBUG": "0"}
-    subprocess.run(["cargo", "build", "--release", "--locked", "--bin", "flockreel"], cwd=SOURCES, env=environment, check=True)
-    return PLACE / "target" / "release" / "flockreel"
+    """Builds the program in the profile of tests, which optimizes the algorithms, without its slow checks."""
+    words = ["cargo", "build", "--locked", "--bin", "flockreel"]
+    for check in ("overflow-checks", "debug-assertions"):
+        words += ["--config", f"profile.dev.package.flockreel-core.{check}=false"]
+    subprocess.run(words, cwd=SOURCES, env={**os.environ, "CARGO_TARGET_DIR": str(PLACE / "target")}, check=True)
+    return PLACE / "target" / "debug" / "flockreel"
 
 
 def mattes_halo(library):
     """Returns the share of alpha that is far outside the contour of the mattes."""
     with zipfile.ZipFile(library / "mattes.zip") as archive:
         pictures = (cv2.imdecode(np.frombuffer(archive.read(name), np.uint8), cv2.IMREAD_UNCHANGED) for name in archive.namelist())
-        return halo([rgba[..., 3] for rgba in pictures if rgba is not None and rgba.ndim == 3 and rgba.shape[2] == 4 and rgba[..., 3].any()])
+        alphas = [rgba[..., 3] for rgba in pictures if rgba is not None and rgba.ndim == 3 and rgba.shape[2] == 4]
+        return halo([alpha for alpha in alphas if alpha.any()])
+
+
+def direction_deg(poses, truth):
+    """Returns the median angle between the measured and the true direction in space, degrees; 0 without either."""
+    angles = [math.degrees(math.acos(max(-1, min(1, sum(a * b for a, b in zip(pose["forward"], row["forward"]))))))
+              for pose, row in zip(poses["frames"], truth["frames"]) if pose.get("forward") and any(row.get("forward", ()))]
+    return quantile(angles, .5) or 0.0
 
 
 def measure(program, film, rule):
-    """Returns scores in points of 100 (frames right, heads right, halo, ...), or the code of a refusal."""
-    name, path, flags, known = film
-    with tempfile.TemporaryDirectory() as folder:
-        library = pathlib.Path(folder) / "library"
-        words = [program, "analyze", path, "-o", library, *flags]
-        done = subprocess.run([str(w) for w in words], capture_output=True, text=True, env={**os.environ, "FLOCKREEL_RULE_OFF": rule})
-        if done.returncode:
-            lines = [line for line in done.stderr.splitlines() if line.endswith(")")]
-            return {"refused": lines[-1].rsplit("(", 1)[1].rstrip(")") if lines else "failed"}
-        poses = json.loads((library / "poses.json").read_text())
-        points = {"halo": 100 * (mattes_halo(library) or 0)}
-    if "clip" in known:
-        known = {**known, "frames": [row for row in known["frames"] if row["frame"] < len(poses["frames"])]}
-        score = score_labels(poses, known)
-        right = (score["found"] - score["far"]) / score["n"]
-        heads = 1 - len(score["heads_wrong"]) / max(score["heads_told"], 1)
-        points |= {"view": 100.0 * score["view_right"]}
-    else:
-        score, _, _ = score_case(poses, known)
-        right = score["found"] * score["right"] - score["invented"] / score["n"]
-        heads = 1 - score["flips"] / max(score["n_aside"], 1)
-        points |= {"view": 100.0 * (poses["view"] == "side")}
-    points |= {"animals": -100.0 * ("several_animals" in done.stderr)}
-    return {"right": 100 * right, "heads": 100 * heads, **points}
+    """Returns scores in points of 100 (frames right, heads right, halo, ...) or degrees, or the code of a refusal.
+
+    `reads` are the rules whose switches were read, if `rule` is "none".
+    """
+    name, path, flags, known, masks, seconds = film
+    with analyzed(program, path, "--to", seconds, *flags, environment={**os.environ, "FLOCKREEL_RULE_OFF": rule}) as run:
+        points = {"reads": sorted({line.split()[-1] for line in run.said.splitlines() if line.startswith("reads the switch ")})}
+        if run.refused:
+            return {**points, "refused": run.refused}
+        poses = run.poses
+        points["halo"] = -100 * (mattes_halo(run.library) or 0)
+        if "clip" in known:
+            known = {**known, "frames": [row for row in known["frames"] if row["frame"] < seconds * poses["fps"]]}
+            score = score_labels(poses, known)
+            right = (score["found"] - score["far"]) / score["n"]
+            heads = 1 - len(score["heads_wrong"]) / max(score["heads_told"], 1)
+            points["view"] = 100.0 * score["view_right"]
+        else:
+            known = {**known, "frames": known["frames"][:round(seconds * poses["fps"])]}
+            score, _, _ = score_case(poses, known)
+            right = score["found"] * score["right"] - score["invented"] / score["n"]
+            heads = 1 - score["flips"] / max(score["n_aside"], 1)
+            points |= {"sure": -100 * score["sure_and_far"] / score["n"], "leaps": -100 * score["leaps"] / max(score["n_steps"], 1),
+                       "view": 100.0 * (poses["view"] == "side"), "direction": -direction_deg(poses, known)}
+            if masks.exists():
+                shown = np.load(masks)
+                shown = {k: mask for k, mask in zip(shown["frames"].tolist(), shown["masks"]) if k < len(known["frames"])}
+                points["overlap"] = 100 * statistics.median(overlaps(run.mattes(), shown).values())
+        return {**points, "right": 100 * right, "heads": 100 * heads, "animals": -100.0 * ("several_animals" in run.said)}
 
 
 def change(with_rule, without):
-    """Returns what a film loses without a rule, in points; negative if it gains."""
+    """Returns what a film loses without a rule, in points or degrees; negative if it gains."""
     if "refused" in with_rule or "refused" in without:
         return 100.0 * (("refused" in without) - ("refused" in with_rule))
-    gains = [with_rule[key] - without[key] for key in ("right", "heads", "view", "animals")] + [without["halo"] - with_rule["halo"]]
-    return max(gains, key=abs)
+    return max((with_rule[key] - without[key] for key in with_rule if key != "reads"), key=abs)
 
 
 def verdict(losses):
@@ -136,9 +159,10 @@ def page(results):
                 named = ", ".join(f"{film} {loss:.0f}" for film, loss in losses.items() if abs(loss) > CLEARLY)
                 rows.append((f"`{name}`", rule["says"], verdict(losses), named))
     return ["## Contribution of each rule", "",
-            "Each rule of `bench/ablation.toml` is switched off, one at a time. The last column has the points of 100 that a film loses without it, "
-            "if more than one; negative points are gains. Points count frames within 0.1 body lengths, heads at the right end, the view, and the halo "
-            "of the mattes. A refusal is 100. The verdict is `useful` from two films on, and `doubtful` if a film gains.", "",
+            "Each rule of `bench/ablation.toml` is switched off, one at a time. The last column has the points of 100 that a film "
+            "loses without it, if more than one; negative points are gains. Points count frames within 0.1 body lengths, frames that are sure and far "
+            "off, false steps, heads at the right end, the view, the overlap and the halo of mattes; degrees of the direction in "
+            "space count like points. A refusal is 100. The verdict is `useful` from two films on, and `doubtful` if a film gains.", "",
             "Repeat: `make ablation GENERATOR=goldfish.py FOOTAGE=folder`", "", *table(["rule", "meaning", "verdict", "films"], rows)]
 
 
@@ -147,36 +171,48 @@ def main():
     parser.add_argument("generator", type=pathlib.Path)
     parser.add_argument("--footage", type=pathlib.Path)
     parser.add_argument("--films", type=pathlib.Path, default=ROOT / "target" / "accuracy")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
     args = parser.parse_args()
     import measurements  # not at the top, because it imports this file
     rules = rules_of_table()
-    names = [name for rule in rules for name in rule.get("names", [rule["name"]])]
     lay_out(rules)
     program = build()
-    films = [(name, path, flags, json.loads(truth.read_text())) for name, path, truth, flags, _ in cases.films(args.generator, args.films)
-             if name in CASES]
-    for clip, seconds in CLIPS.items() if args.footage else []:
-        labels = json.loads((HERE / "labels" / f"{clip}.json").read_text())
-        films.append((clip, args.footage / labels["clip"], ["--to", str(seconds)], labels))
-    digest = hashlib.sha256(program.read_bytes()).hexdigest()[:16]
-    kept = PLACE / digest
+    films = films_of(args)
+    kept = PLACE / hashlib.sha256(program.read_bytes()).hexdigest()[:16]
     kept.mkdir(parents=True, exist_ok=True)
 
     def measured(film, rule):
-        file = kept / f"{rule or 'all'}-{film[0]}.json"
+        file = kept / f"{rule}-{film[0]}-{film[-1]}.json"
         if not file.exists():
             file.write_text(json.dumps(measure(program, film, rule)))
         return json.loads(file.read_text())
 
-    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        base = dict(zip((film[0] for film in films), pool.map(lambda film: measured(film, ""), films)))
+    with concurrent.futures.ThreadPoolExecutor(args.jobs) as pool:
+        base = dict(zip((film[0] for film in films), pool.map(lambda film: measured(film, "none"), films)))
         results = {"all": base, "rules": {}}
-        for name in names:
-            scores = pool.map(lambda film: measured(film, name), films)
-            losses = {film[0]: change(base[film[0]], score) for film, score in zip(films, scores)}
+        for name in (name for rule in rules for name in rule.get("names", [rule["name"]])):
+            reading = [film for film in films if name in base[film[0]]["reads"]]
+            scores = pool.map(lambda film: measured(film, name), reading)
+            losses = {film[0]: change(base[film[0]], score) for film, score in zip(reading, scores)}
             results["rules"][name] = losses
             print(f"{name:24}{verdict(losses):10}", *(f"{f} {v:.0f}" for f, v in losses.items() if abs(v) > CLEARLY), flush=True)
     measurements.save("ablation", results)
+
+
+def films_of(args):
+    """Returns (name, path, flags of analyze, truth or labels, path of the masks, seconds) for each film."""
+    films = []
+    for name, path, truth_path, flags, _ in cases.films(args.generator, args.films, CASES):
+        truth, masks = json.loads(truth_path.read_text()), args.films / f"{name}.masks.npz"
+        if name == CALIBRATED:
+            camera, animal = PLACE / f"{name}.camera.json", truth["animal"]
+            camera.write_text(json.dumps({key: truth["camera"][key] for key in ("z_min_m", "pane_px_per_m")}))
+            flags = [*flags, "--camera", camera, "--animal-length", animal["length_m"], "--animal-height", animal["height_m"]]
+        films.append((name, path, flags, truth, masks, CASES[name]))
+    for clip, seconds in CLIPS.items() if args.footage else []:
+        labels = json.loads((HERE / "labels" / f"{clip}.json").read_text())
+        films.append((clip, args.footage / labels["clip"], [], labels, None, seconds))
+    return films
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Measures the accuracy of poses, on generated films, films with faults (cases.py) and labeled recordings.
+"""Measures the accuracy of poses, on generated films, films with faults (cases.py), drawn films (kinds.py) and labeled recordings.
 
-    accuracy.py FLOCKREEL GENERATOR [--footage FOLDER] [--against FLOCKREEL] [--films FOLDER]
+    accuracy.py FLOCKREEL GENERATOR [--footage FOLDER] [--against FLOCKREEL] [--films FOLDER] [--only NAME,...]
 
 GENERATOR is a script called as `GENERATOR STEM --seed N [--frames N] [--hard] [--colour C] [--size WxH]
 [--length M] [--height M] [--crf N]`. It writes STEM.mp4, STEM.background.png, and STEM.truth.json with
@@ -9,7 +9,8 @@ GENERATOR is a script called as `GENERATOR STEM --seed N [--frames N] [--hard] [
 
 Films are kept in the folder, by default target/accuracy. Writes bench/results/accuracy.json and its section of
 docs/measurements.md. --against compares errors and processor time with another program on the generated films;
-it prints the ratios and stores nothing of them.
+it prints the ratios and stores nothing of them. --only prints the scores of the films of these names or kinds, and
+stores nothing.
 """
 import argparse, collections, concurrent.futures, contextlib, json, math, os, pathlib, re, resource, statistics, subprocess, sys, tempfile
 import zipfile
@@ -40,10 +41,10 @@ def quantile(values, share):
 class Run:
     """An analysis: its poses, or the code of its refusal; the printed text; the processor time in seconds."""
 
-    def __init__(self, program, film, flags, library):
+    def __init__(self, program, film, flags, library, environment):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         words = [program, "analyze", film, "-o", library, *flags]
-        done = subprocess.run([str(w) for w in words], capture_output=True, text=True)
+        done = subprocess.run([str(w) for w in words], capture_output=True, text=True, env=environment)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         self.cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         self.library, self.said, self.refused, self.poses = library, done.stderr, None, None
@@ -70,9 +71,9 @@ class Run:
 
 
 @contextlib.contextmanager
-def analyzed(program, film, *flags):
+def analyzed(program, film, *flags, environment=None):
     with tempfile.TemporaryDirectory() as folder:
-        yield Run(program, film, flags, pathlib.Path(folder) / "library")
+        yield Run(program, film, flags, pathlib.Path(folder) / "library", environment)
 
 
 def placed(left, top, mask, shape):
@@ -178,22 +179,35 @@ def calibration(films):
     """Compares confidence with the share of right frames, in ten bins from .5 to 1.
 
     `films` are pairs of a kind and a list. Every film has the same weight. Returns the bins, the expected calibration
-    error, that of each kind of film, and the largest error of bins with at least 200 frames.
+    error, that of each kind of film, and the largest error of bins with at least 200 frames. `left_out` is the error of
+    each kind if a confidence means what it means in the films of all other kinds.
     """
     films = [(kind, pairs) for kind, pairs in films if pairs]
     rows = bins_of([pairs for _, pairs in films])
     kinds = collections.defaultdict(list)
     for kind, pairs in films:
         kinds[kind].append(pairs)
+    others = {kind: [pairs for other, pairs in films if other != kind] for kind in kinds}
     return {"bins": rows, "ece": error_of(rows), "kinds": {kind: error_of(bins_of(lists)) for kind, lists in kinds.items()},
-            "worst_bin": max(abs(row["confidence"] - row["right"]) for row in rows if row["frames"] >= 200)}
+            "left_out": {kind: error_of(bins_of([recalibrated(pairs, others[kind]) for pairs in lists])) for kind, lists in kinds.items()},
+            "worst_bin": max((abs(row["confidence"] - row["right"]) for row in rows if row["frames"] >= 200), default=0.0)}
+
+
+def bin_of(confidence):
+    return min(9, max(0, int((confidence - .5) * 20)))
+
+
+def recalibrated(pairs, films):
+    """Returns the pairs with the share of right frames of the same bin in other films as their confidence."""
+    right = {bin_of(row["confidence"]): row["right"] for row in bins_of(films)}
+    return [(right.get(bin_of(confidence), confidence), is_right) for confidence, is_right in pairs]
 
 
 def bins_of(films):
     bins = [[0.0, 0.0, 0.0, 0] for _ in range(10)]
     for pairs in films:
         for confidence, is_right in pairs:
-            row = bins[min(9, max(0, int((confidence - .5) * 20)))]
+            row = bins[bin_of(confidence)]
             weight = 1 / len(pairs) / len(films)
             row[0] += weight
             row[1] += weight * confidence
@@ -295,14 +309,21 @@ def case(program, film):
     return name, kind, {**score, "as_expected": meets(truth["expected"], score, run.said)}, sure, heads
 
 
-def measure(args):
+def scores_of_films(args):
+    """Returns what `case` returns, for the films of cases.py and kinds.py."""
     import cases
-    folder = args.films
-    films = cases.films(args.generator, folder)
+    films = cases.films(args.generator, args.films, args.only)
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        scored = list(pool.map(lambda film: case(args.program, film), films))
+        return list(pool.map(lambda film: case(args.program, film), films))
+
+
+def measure(args):
+    import kinds
+    scored, folder = scores_of_films(args), args.films
+    is_drawn = lambda name: name in {f"{kind}-{seed}" for kind in kinds.KINDS for seed in kinds.SEEDS}
     results = {
-        "cases": {name: score for name, _, score, _, _ in scored},
+        "cases": {name: score for name, _, score, _, _ in scored if not is_drawn(name)},
+        "drawn": {name: score for name, _, score, _, _ in scored if is_drawn(name)},
         "confidence": calibration([(kind, sure) for _, kind, _, sure, _ in scored]),
         "head_confidence": calibration([(kind, heads) for _, kind, _, _, heads in scored]),
         "generated": generated(args.program, args.generator, folder),
@@ -317,7 +338,7 @@ def measure(args):
 
 def bars(results):
     """Returns (measure, figure, limit, whether it holds)."""
-    cases = results["cases"].values()
+    cases = [*results["cases"].values(), *results.get("drawn", {}).values()]
     measured = [score for score in cases if "refused" not in score]
     n = sum(score["n"] for score in measured)
     far = sum(score["sure_and_far"] for score in measured) / n
@@ -329,6 +350,9 @@ def bars(results):
                      worst <= .1))
         kind, ece = max(results[name]["kinds"].items(), key=lambda item: item[1])
         rows.append((f"films: calibration error of `{name}` in the worst kind of films, `{kind}`", f"{ece:.4f}", "< 0.05", ece < .05))
+        kind, ece = max(results[name].get("left_out", {"": 0}).items(), key=lambda item: item[1])
+        rows.append((f"films: calibration error of `{name}` by the films of other kinds, in the worst kind, `{kind}`", f"{ece:.4f}",
+                     "< 0.05", ece < .05))
     silent = sum(score["silently_wrong"] for score in measured)
     rows.append(("films: silently wrong (over 3% of the frames with `confidence` above 0.9 and an error over 0.25 BL)", str(silent), "0",
                  silent == 0))
@@ -337,15 +361,16 @@ def bars(results):
     leaps = sum(score["leaps"] for score in measured) / sum(score["n_steps"] for score in measured)
     rows.append(("films: share of false steps over 1 BL between frames, with `confidence` above 0.5", f"{leaps:.3%}", "< 0.1%",
                  leaps < .001))
-    iou = min(score["iou"] for score in measured if "iou" in score)
-    rows.append(("films: intersection over union of matte and animal, median over frames, lowest of all films", f"{iou:.3f}", "> 0.9",
-                 iou > .9))
+    iou = min(score["iou"] for score in results["cases"].values() if "iou" in score)
+    rows.append(("films with faults: intersection over union of matte and animal, median over frames, lowest of all films", f"{iou:.3f}",
+                 "> 0.9", iou > .9))
     clips = {name: clip for name, clip in results.get("labels", {}).items() if "refused" not in clip}
     if clips:
         least = min(clip["found"] / clip["n"] for clip in clips.values())
         rows.append(("recordings: share of frames in which the animal is found, lowest of all clips", f"{least:.1%}", "> 95%", least > .95))
         told = min(clip["heads_told"] / max(clip["heads"], 1) for clip in clips.values())
-        rows.append(("recordings: share of visible heads with `head_confidence` above 0.5, lowest of all clips", f"{told:.1%}", "> 85%", told > .85))
+        rows.append(("recordings: share of visible heads with `head_confidence` above 0.5, lowest of all clips", f"{told:.1%}", "> 85%",
+                     told > .85))
         wrong = sum(len(clip["heads_wrong"]) for clip in clips.values()) / sum(clip["heads_told"] for clip in clips.values())
         rows.append(("recordings: share of these heads at the wrong end, all clips together", f"{wrong:.1%}", "< 1%", wrong < .01))
         off = sum(clip["far"] for clip in clips.values()) / sum(clip["centroids"] for clip in clips.values())
@@ -397,12 +422,18 @@ def page(results):
             *(outline_table(results["outlines"]) if "outlines" in results else []), *generated_table(results["generated"])]
 
 
-def case_tables(results):
+def film_table(scores):
     mark = lambda name, s: name if s["as_expected"] else f"{name} *"
+    figure = lambda value: "" if value is None else f"{value:.3f}"
     rows = [(mark(name, s), f"refused: `{s['refused']}`") if "refused" in s else
-            (mark(name, s), f"{s['found']:.1%}", f"{s['off_p50']:.3f}", f"{s['off_p95']:.3f}", f"{s['right']:.1%}", s["far"], s["invented"],
-             f"{s['flips']} of {s['n_aside']}", s["leaps"], f"{s['iou']:.3f}" if "iou" in s else "")
-            for name, s in results["cases"].items()]
+            (mark(name, s), f"{s['found']:.1%}", figure(s["off_p50"]), figure(s["off_p95"]), f"{s['right']:.1%}", s["far"], s["invented"],
+             f"{s['flips']} of {s['n_aside']}", s["leaps"], figure(s.get("iou")), s["sure_and_far"])
+            for name, s in scores.items()]
+    return table(["film", "found", "error, median", "error, p95", "within 0.1", "over 0.25", "false detections", "wrong heads", "leaps",
+                  "overlap", "sure and far"], rows)
+
+
+def case_tables(results):
     yield from ("", "### Films with faults", "")
     yield ("`bench/cases.py` makes films of a synthetic fish with typical faults, each in three strengths and with three seeds. The number "
            "in a name is the seed. Films without a fault are also stored in other file formats: `pictures` (PNG, or TIFF with 16 bits), "
@@ -410,11 +441,16 @@ def case_tables(results):
            "`unfinished_recording`. The films from `plain-1` on have no fault added. *Over 0.25* and *false detections* (in frames "
            "without the animal) are numbers of frames. Wrong heads are counted where "
            "the animal points less than 60 degrees out of the picture plane. Leaps are steps over 1 BL between frames. The overlap is the "
-           "intersection over union of the matte and the true animal. A star marks a film that is neither measured nor refused as "
-           "its truth expects.")
+           "intersection over union of the matte and the true animal. Frames are sure and far if `confidence` is above 0.9 and the "
+           "error over 0.25 BL. A star marks a film that is neither measured nor refused as its truth expects.")
     yield ""
-    yield from table(["film", "found", "error, median", "error, p95", "within 0.1", "over 0.25", "false detections", "wrong heads", "leaps",
-                      "overlap"], rows)
+    yield from film_table(results["cases"])
+    if "drawn" in results:
+        yield from ("", "### Drawn films", "")
+        yield ("`bench/kinds.py` draws films of kinds of animals and situations, each with three seeds. The columns are those of the table "
+               "above. A star marks a film that is silently wrong, or refused without advice.")
+        yield ""
+        yield from film_table(results["drawn"])
     yield from ("", "### Calibration", "")
     yield ("Each row has the frames of the films above with similar confidence. The columns *mean* and *right* should be equal. `confidence` is right if "
            "the error is at most 0.1 BL, `head_confidence` if the head is at the right end. Each film has the same weight.")
@@ -422,10 +458,12 @@ def case_tables(results):
         yield ""
         yield from table([f"mean `{name}`", "right", "weighted share", "frames"], [
             (f"{row['confidence']:.3f}", f"{row['right']:.3f}", f"{row['share']:.1%}", row["frames"]) for row in results[name]["bins"]])
-    yield from ("", "Mean calibration error of each kind of films:", "")
-    yield from table(["kind", "`confidence`", "`head_confidence`"], [
-        (kind, f"{ece:.4f}", f"{results['head_confidence']['kinds'].get(kind, 0):.4f}")
-        for kind, ece in results["confidence"]["kinds"].items()])
+    yield from ("", "Mean calibration error of each kind of films, and its error if a confidence means what it means in the films of "
+                "all other kinds:", "")
+    confidence, head = results["confidence"], results["head_confidence"]
+    yield from table(["kind", "`confidence`", "by the other kinds", "`head_confidence`"], [
+        (kind, f"{ece:.4f}", f"{confidence.get('left_out', {}).get(kind, 0):.4f}", f"{head['kinds'].get(kind, 0):.4f}")
+        for kind, ece in confidence["kinds"].items()])
 
 
 def label_table(labels):
@@ -467,8 +505,14 @@ def main():
     parser.add_argument("--footage", type=pathlib.Path)
     parser.add_argument("--against", type=pathlib.Path)
     parser.add_argument("--films", type=pathlib.Path, default=HERE.parent / "target" / "accuracy")
+    parser.add_argument("--only", type=lambda names: names.split(","), default=())
     args = parser.parse_args()
     args.program = args.program.resolve()
+    if args.only:
+        scored = scores_of_films(args)
+        print(*film_table({name: score for name, _, score, _, _ in scored}), sep="\n")
+        print(json.dumps(calibration([(kind, sure) for _, kind, _, sure, _ in scored]), indent=1))
+        return
     import measurements  # not at the top, because it imports this file
     results = measure(args)
     measurements.save("accuracy", results)

@@ -1,8 +1,8 @@
 """Films of one animal with typical faults, and their truth: light, camera, other objects, rest, file formats.
 
 Each case takes a film of the generator (goldfish.py) and changes its frames and its truth; `holds_station` draws its
-own. A frame without a centroid in the truth shows no animal. NAME.masks.npz has the animal in ten frames of some films,
-as `frames` and `masks`.
+own. The films that kinds.py draws are made here, too. A frame without a centroid in the truth shows no animal.
+NAME.masks.npz has the animal in ten frames of some films, as `frames` and `masks`.
 
 `expected` of a truth tells what a good program does. `refused` is null, or the codes of right refusals. `found` is the
 least share of frames with the animal in which it is found. Other numbers are upper limits of the scores of accuracy.py,
@@ -13,6 +13,8 @@ import io, json, pathlib, subprocess, sys, zipfile
 import cv2
 import numpy as np
 from PIL import Image
+
+import drawing, kinds
 
 N_FRAMES = 300
 SEEDS = (3001, 3002, 3003)
@@ -383,6 +385,12 @@ EXPECTED = {
 }
 
 
+# Drawn films may be difficult: the program may be unsure, or refuse them with advice, but not be wrong and sure.
+DRAWN = {"either": [{"refused": None, "silently_wrong": 0},
+                    {"refused": ["nothing_moves", "background_not_static", "several_animals", "animal_too_large", "light_changes"],
+                     "says": "--[a-z]|[Ff]ilm "}]}
+
+
 H264 = ("-c:v", "libx264", "-preset", "fast", "-crf", "18", "-pix_fmt", "yuv420p")
 
 
@@ -402,19 +410,24 @@ def encode(path, rows, fps=30, coding=H264):
     return poses
 
 
-def films(generator, folder):
-    """Makes the missing films. Returns (name, path, path of the truth, flags of analyze, kind) for each."""
+def films(generator, folder, only=()):
+    """Makes the missing films. Returns (name, path, path of the truth, flags of analyze, kind) for each.
+
+    `only` are names and kinds of films; all are made if it is empty.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     made = []
 
-    def add(name, suffix, make, flags=()):
+    def add(name, suffix, make, flags=(), expected=None):
         path, truth, case = folder / f"{name}{suffix}", folder / f"{name}.truth.json", name.rsplit("-", 1)[0]
         kind = case.split("-")[0]
+        if only and name not in only and kind not in only:
+            return
         if not truth.exists():
-            known = {**make(path), "expected": EXPECTED.get(case, EXPECTED.get(kind, GOOD))}
-            masks = [pose.pop("mask") for pose in known["frames"] if "mask" in pose]
+            known = {**make(path), "expected": expected or EXPECTED.get(case, EXPECTED.get(kind, GOOD))}
+            masks = {k: pose.pop("mask") for k, pose in enumerate(known["frames"]) if "mask" in pose}
             if masks:
-                frames = np.linspace(0, len(masks) - 1, 12)[1:-1].round().astype(int)
+                frames = [list(masks)[k] for k in np.linspace(0, len(masks) - 1, 12)[1:-1].round().astype(int)]
                 np.savez_compressed(folder / f"{name}.masks.npz", frames=frames, masks=[masks[k] for k in frames])
             truth.write_text(json.dumps(known))
         made.append((name, path, truth, list(flags), kind))
@@ -451,4 +464,8 @@ def films(generator, folder):
                 path.write_bytes(base.film.read_bytes())
                 return base.truth
             add(f"{kind}-{seed}", ".mp4", make)
+    for kind, draw in kinds.KINDS.items():
+        for seed in kinds.SEEDS:
+            add(f"{kind}-{seed}", ".mp4", lambda path: {"fps": 30, "frames": encode(path, draw(drawing.Film(kind, seed)))},
+                kinds.FLAGS.get(kind, ()), DRAWN)
     return made

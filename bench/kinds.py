@@ -1,547 +1,17 @@
-"""Films of kinds of animals and situations, drawn, with exact truth: python kinds.py FOLDER [KIND ...]
+"""Films of kinds of animals and situations, drawn, with exact truth (cases.py makes the files).
 
 Each kind draws one animal as textured, shaded bodies with soft edges on a textured place, seen through a slightly
-blurred, noisy camera. Everything (place, colors, sizes, timing) follows from the kind and the seed.
+blurred, noisy camera. Everything (place, colors, sizes, timing) follows from the kind and the seed. A kind yields
+(picture, pose) for every frame.
 """
-import json, os, pathlib, subprocess, sys, zlib
-
 import cv2
 import numpy as np
 
-cv2.setNumThreads(1)
-TAU = 2 * np.pi
-SIZES = [(320, 240), (480, 270), (480, 360), (640, 360), (640, 360), (640, 480), (800, 450), (960, 540)]
+from animals import (apart, aside, draw_jelly, facing, fish_color, glide, insect, lag, ribbons, roam, rodent, runner, shrimp_of,
+                     side_fish, spine, top_fish)
+from drawing import (TAU, arena, bedding, center_of, darken, drift, fractal, gravel, ground, litter, mix, sand, skin, smooth, soil, step,
+                     tank, turned, weave, wood, yard)
 
-
-def mix(a, b, t):
-    return np.asarray(a, np.float32) * (1 - t) + np.asarray(b, np.float32) * t
-
-
-def step(x, lo, hi):
-    t = np.clip((x - lo) / (hi - lo), 0, 1)
-    return t * t * (3 - 2 * t)
-
-
-def smooth(a, sigma):
-    """Returns a curve smoothed over time, its ends held."""
-    r = int(4 * sigma) + 1
-    g = np.exp(-.5 * (np.arange(-r, r + 1) / sigma) ** 2)
-    return np.convolve(np.pad(np.asarray(a, float), r, "edge"), g / g.sum(), "valid")
-
-
-def drift(rng, n, sigma):
-    """Returns a slow random curve of unit spread."""
-    a = smooth(rng.standard_normal(n + int(8 * sigma)), sigma)[int(4 * sigma):][:n]
-    return a / max(a.std(), 1e-6)
-
-
-def fractal(rng, h, w, cell=64.0, octaves=5, gain=.6, stretch=(1, 1)):
-    """Returns value noise of several octaves, of unit spread; stretch lengthens its grains (x, y)."""
-    total = np.zeros((h, w), np.float32)
-    for o in range(octaves):
-        cx, cy = max(cell * stretch[0] / 2 ** o, 1), max(cell * stretch[1] / 2 ** o, 1)
-        grid = rng.standard_normal((int(h / cy) + 4, int(w / cx) + 4)).astype(np.float32)
-        big = cv2.resize(grid, (int(grid.shape[1] * cx) + 1, int(grid.shape[0] * cy) + 1), interpolation=cv2.INTER_CUBIC)
-        oy, ox = rng.integers(int(cy) + 1), rng.integers(int(cx) + 1)
-        total += gain ** o * big[oy:oy + h, ox:ox + w]
-    return (total - total.mean()) / total.std()
-
-
-# Places. Each returns a float picture (BGR) of the film's size.
-
-def stones(rng, h, w, size, palette, gap=.45):
-    image = np.full((h, w, 3), np.mean(palette, 0) * gap, np.float32)
-    for big in (1.5, 1.0, .7):
-        for _ in range(int(1.1 * h * w / (size * big) ** 2)):
-            x, y = rng.uniform(-size, w + size), rng.uniform(-size, h + size)
-            a, b = size * big * rng.uniform(.4, .8), size * big * rng.uniform(.3, .55)
-            color = palette[rng.integers(len(palette))] * rng.uniform(.75, 1.2)
-            turn = rng.uniform(0, 180)
-            for dx, dy, f, g in ((.18, .2, 1.05, .45), (0, 0, 1, 1), (-.12, -.15, .55, 1.13)):
-                cv2.ellipse(image, (int((x + dx * b) * 16), int((y + dy * b) * 16)), (int(a * f * 16), int(b * f * 16)), turn, 0, 360,
-                            (color * g).tolist(), -1, cv2.LINE_AA, 4)
-    image = cv2.GaussianBlur(image, (0, 0), .6)
-    return image * (1 + .06 * fractal(rng, h, w, 6, 3)[..., None]) * (1 + .08 * fractal(rng, h, w, w / 3, 3)[..., None])
-
-
-def gravel(rng, h, w):
-    tone = mix([60, 75, 90], [150, 165, 180], rng.uniform())
-    return stones(rng, h, w, w / 640 * rng.uniform(7, 16), tone * rng.uniform(.7, 1.3, (6, 1)) + rng.normal(0, 9, (6, 3)))
-
-
-def sand(rng, h, w, color=None):
-    color = mix([105, 145, 170], [170, 195, 210], rng.uniform()) if color is None else color
-    turn = rng.uniform(0, np.pi)
-    y, x = np.mgrid[:h, :w] / w * 640
-    wave = np.sin((x * np.cos(turn) + y * np.sin(turn)) / rng.uniform(6, 14) + 1.6 * fractal(rng, h, w, 90, 4))
-    light = 1 + .03 * wave + .03 * fractal(rng, h, w, 120, 5) + .035 * fractal(rng, h, w, 10, 4) + .07 * rng.standard_normal((h, w))
-    return color * cv2.GaussianBlur(light.astype(np.float32), (0, 0), .7)[..., None]
-
-
-def strips(rng, h, w, length, thick, palette, n, curl=.6):
-    """Shavings or straw: many short bent strips, each with its shadow."""
-    image = np.full((h, w, 3), np.mean(palette, 0) * .55, np.float32)
-    for _ in range(n):
-        x, y, turn, bend = rng.uniform(-20, w + 20), rng.uniform(-20, h + 20), rng.uniform(0, TAU), rng.normal(0, curl)
-        t = np.linspace(-.5, .5, 7); a = turn + bend * t
-        line = np.stack([np.cos(a), np.sin(a)], 1).cumsum(0) * length * rng.uniform(.5, 1.3) / 7 + (x, y)
-        side = np.stack([-np.sin(a), np.cos(a)], 1) * thick * rng.uniform(.6, 1.3) * (1 - 1.6 * t[:, None] ** 2) / 2
-        color = palette[rng.integers(len(palette))] * rng.uniform(.8, 1.15)
-        for d, f, g in ((thick * .3, 1, .62), (0, 1, 1), (-thick * .08, .45, 1.09)):
-            poly = np.concatenate([line + side * f, (line - side * f)[::-1]]) + d
-            cv2.fillPoly(image, [np.round(poly * 16).astype(np.int32)], (color * g).tolist(), cv2.LINE_AA, 4)
-    return cv2.GaussianBlur(image, (0, 0), .6) * (1 + .05 * fractal(rng, h, w, 8, 4)[..., None])
-
-
-def bedding(rng, h, w):
-    tone, s = mix([110, 150, 185], [165, 195, 215], rng.uniform()), w / 640
-    return strips(rng, h, w, 26 * s, rng.uniform(5, 9) * s, tone * rng.uniform(.85, 1.15, (6, 1)) + rng.normal(0, 5, (6, 3)), 3200)
-
-
-def litter(rng, h, w):
-    """Dead leaves, one over another, with midribs."""
-    s = w / 640
-    image = stones(rng, h, w, 7 * s, np.array([[35, 45, 60], [50, 65, 85], [30, 36, 45]], np.float32))
-    for _ in range(170):
-        x, y, a, l = rng.uniform(0, w), rng.uniform(0, h), rng.uniform(0, TAU), rng.uniform(35, 95) * s
-        u = np.linspace(0, 1, 14); bend = rng.normal(0, .15) * l * u * (1 - u) * 4
-        wide = l * rng.uniform(.16, .3) * np.sin(np.pi * u ** .8) * (1 + rng.normal(0, .06, 14))
-        turn = np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]])
-        at = lambda v: np.stack([l * (u - .5), v + bend], 1) @ turn + (x, y)
-        color = mix([40, 75, 120], [85, 125, 165], rng.uniform()) * rng.uniform(.6, 1.15) + rng.normal(0, 8, 3)
-        for up, low, d, g in ((1, 1, 4 * s, .45), (1, 1, 0, 1), (.0, .95, 0, .86)):
-            poly = np.concatenate([at(wide * up), at(-wide * low)[::-1]]) + d
-            cv2.fillPoly(image, [np.round(poly * 16).astype(np.int32)], (color * g).tolist(), cv2.LINE_AA, 4)
-        cv2.polylines(image, [np.round(at(0 * u) * 16).astype(np.int32)], False, (color * 1.2).tolist(), 1, cv2.LINE_AA, 4)
-        for j in range(2, 12, 2):
-            for side in (-1, 1):
-                ends = np.stack([at(0 * u)[j], at(wide * side * .8)[min(j + 2, 13)]])
-                cv2.polylines(image, [np.round(ends * 16).astype(np.int32)], False, (color * .8).tolist(), 1, cv2.LINE_AA, 4)
-    return cv2.GaussianBlur(image, (0, 0), .6) * (1 + .09 * fractal(rng, h, w, 20, 5)[..., None])
-
-
-def wood(rng, h, w):
-    color, upright = mix([60, 95, 140], [130, 170, 205], rng.uniform()), rng.uniform() < .5
-    h, w = (w, h) if upright else (h, w)
-    image, y, thick = np.zeros((h, w, 3), np.float32), 0, int(h / rng.uniform(2.2, 5))
-    while y < h:
-        grain = fractal(rng, thick, w, 26, 6, .7, (9, .6))
-        rings = np.sin(np.arange(thick)[:, None] / thick * rng.uniform(8, 25) + 2.2 * fractal(rng, thick, w, 80, 3, .5, (4, 1)))
-        board = color * rng.uniform(.88, 1.1) * (1 + .07 * grain + .05 * rings)[..., None]
-        board[:2] *= .5; image[y:y + thick] = board[:h - y]; y += thick
-    return image if not upright else np.ascontiguousarray(image.transpose(1, 0, 2))
-
-
-def weave(rng, h, w):
-    color = rng.uniform(80, 180) + rng.normal(0, 17, 3); p = rng.uniform(5, 9) * w / 640
-    y, x = np.mgrid[:h, :w].astype(np.float32); warp = fractal(rng, h, w, 80, 3)
-    a, b = np.sin(TAU * (x + .8 * warp) / p), np.sin(TAU * (y + .8 * warp) / p)
-    pattern = np.where(np.sin(np.pi * x / p) * np.sin(np.pi * y / p) > 0, a * .5 + .5, b * .5 + .5)
-    light = .78 + .2 * pattern + .05 * fractal(rng, h, w, 4, 2) + .06 * fractal(rng, h, w, w / 4, 4)
-    light *= np.where((x // (p * 9)).astype(int) % 5 == 0, rng.uniform(.8, 1.15), 1)
-    return np.clip(color * light[..., None], 8, 245).astype(np.float32)
-
-
-def soil(rng, h, w):
-    color = mix([45, 60, 78], [110, 130, 150], rng.uniform())
-    light = 1 + .06 * fractal(rng, h, w, 90, 3) + .13 * fractal(rng, h, w, 12, 4, .8) + .08 * rng.standard_normal((h, w))
-    image = color * np.clip(light, .3, 2).astype(np.float32)[..., None]
-    for _ in range(int(rng.integers(60, 300))):
-        x, y, r = rng.uniform(0, w), rng.uniform(0, h), rng.exponential(1.8) * w / 640 + .5
-        for d, g in ((.5, .5), (0, rng.uniform(.8, 1.5))):
-            cv2.ellipse(image, (int((x + d * r) * 16), int((y + d * r) * 16)), (int(r * 16), int(r * 11)), rng.uniform(0, 180), 0, 360,
-                        np.clip(color * g, 0, 240).tolist(), -1, cv2.LINE_AA, 4)
-    return cv2.GaussianBlur(image, (0, 0), .5)
-
-
-def arena(rng, h, w):
-    """A laboratory's floor: light plastic with scratches, smudges and dirt."""
-    color = rng.uniform(135, 215) + rng.normal(0, 6, 3)
-    image = (color * (1 + .03 * fractal(rng, h, w, w / 3, 6)[..., None])).astype(np.float32)
-    for _ in range(70):
-        x, y, a, l = rng.uniform(0, w), rng.uniform(0, h), rng.uniform(0, TAU), rng.exponential(w / 14)
-        ends = np.array([[x, y], [x + l * np.cos(a), y + l * np.sin(a)]]) * 16
-        cv2.polylines(image, [ends.astype(np.int32)], False, (color * rng.uniform(.85, 1.1)).tolist(), 1, cv2.LINE_AA, 4)
-    for _ in range(int(rng.integers(15, 60))):
-        x, y, r = rng.uniform(0, w), rng.uniform(0, h), rng.exponential(.8) * w / 640 + .4
-        cv2.circle(image, (int(x * 16), int(y * 16)), int(r * 16), (color * rng.uniform(.5, .92)).tolist(), -1, cv2.LINE_AA, 4)
-    return cv2.GaussianBlur(image, (0, 0), .6)
-
-
-def ground(rng, h, w, *places):
-    return (places or (gravel, bedding, sand, wood, weave, arena, soil))[rng.integers(len(places) or 7)](rng, h, w)
-
-
-def tank(rng, h, w, floor=.86, bed=True, plain=False, water=1):
-    """A tank from the side: a mottled back wall, its water line, dirt on the glass, and a bed of gravel below."""
-    deep, pale = rng.uniform(40, 110) * np.array([1.15, 1.0, .8]), rng.uniform(130, 200) * np.array([1.05, 1.02, .9])
-    y = np.linspace(0, 1, h)[:, None, None]
-    image = mix(pale, deep, y ** rng.uniform(.6, 1.5) * rng.uniform(.4, .9)) * np.ones((1, w, 1))
-    image = image * (1 + (.04 if plain else .1) * fractal(rng, h, w, w / 5, 7, .7)[..., None])
-    for _ in range(0 if plain else int(rng.integers(3, 7))):  # something out of focus behind the glass
-        x, wide, top = rng.uniform(0, w), rng.uniform(.04, .14) * w, rng.uniform(.1, .6) * h
-        spot = np.zeros((h, w), np.float32); spot[int(top):, max(int(x - wide), 0):int(x + wide)] = 1
-        image *= 1 + cv2.GaussianBlur(spot, (0, 0), w / 60)[..., None] * rng.uniform(-.25, .2)
-    image *= 1 + .05 * np.clip(fractal(rng, h, w, 14, 3) - 1.6, 0, 1)[..., None] * 3
-    if bed:
-        edge = h * floor + 3 * w / 640 * fractal(rng, 1, w, w / 6, 4)[0]
-        bed = gravel(rng, h, w) * mix(.6, 1, np.linspace(0, 1, h)[:, None, None])
-        over = np.clip(np.arange(h)[:, None] - edge + .5, 0, 1)[..., None]
-        image = image * (1 - over) + bed * over
-    top = int(h * rng.uniform(.02, .07)) * water; image[:top] *= .55; image[top:top + 2 * water] += 45
-    return image.astype(np.float32)
-
-
-# Bodies.
-
-def skin(rng, color, belly=None, patch=None, bands=0, grain=.1, spots=0, shine=.25, rough=.45, cell=30):
-    """Returns a body's texture, from head to tail (x) and from one side to the other (y), shaded as something round."""
-    h, w = 96, 384
-    v, u = np.linspace(-1, 1, h)[:, None, None], np.linspace(0, 1, w)[None, :, None]
-    color = np.asarray(color, np.float32)
-    tex = color * np.ones((h, w, 1), np.float32)
-    if patch is not None:
-        tex = mix(tex, patch, step(fractal(rng, h, w, 55, 3), .1, .35)[..., None])
-    if bands:
-        tex = tex * (1 - .45 * step(np.sin(TAU * bands * u + .5 * fractal(rng, h, w, 60, 2)[..., None]), .1, .6))
-    if spots:
-        tex = tex * (1 - spots * step(fractal(rng, h, w, 16, 2), .9, 1.2)[..., None])
-    if belly is not None:
-        tex = mix(tex, belly, step(v + .12 * fractal(rng, h, w, 50, 3)[..., None], -.1, .75))
-    tex = tex * (1 + grain * fractal(rng, h, w, cell, 5, .75, (2, 1))[..., None])
-    tex = tex * (1 - rough + rough * np.sqrt(np.clip(1 - .92 * v * v, 0, 1))) + 255 * shine * .35 * np.exp(-((v + .3) / .22) ** 2)
-    return np.clip(tex, 3, 250).astype(np.float32)
-
-
-class Layer:
-    """What lies over the place: premultiplied color, its opacity, and how much of each pixel the animal covers."""
-
-    def __init__(self, h, w):
-        self.rgb, self.a, self.cov = np.zeros((h, w, 3), np.float32), np.zeros((h, w), np.float32), np.zeros((h, w), np.float32)
-
-    def put(self, win, alpha, color, opacity=1.0, own=True):
-        a = (alpha * opacity)[..., None]
-        self.rgb[win] = self.rgb[win] * (1 - a) + color * a
-        self.a[win] = self.a[win] * (1 - a[..., 0]) + a[..., 0]
-        if own:
-            self.cov[win] = np.maximum(self.cov[win], alpha)
-
-    def tube(self, pts, half, color, opacity=1.0, soft=1.0, flip=1, own=True):
-        """Draws a body around a line, with its half widths; color is one color or a skin."""
-        h, w = self.a.shape
-        pts, pad = np.asarray(pts, float), 2 + soft
-        half = np.broadcast_to(np.asarray(half, float), len(pts))
-        lo = np.maximum(np.floor((pts - half[:, None]).min(0) - pad), 0).astype(int)
-        hi = np.minimum(np.ceil((pts + half[:, None]).max(0) + pad) + 1, (w, h)).astype(int)
-        if (hi <= lo).any():
-            return
-        shape = hi[1] - lo[1], hi[0] - lo[0]
-        sdf, u, v = np.full(shape, 99, np.float32), np.zeros(shape, np.float32), np.zeros(shape, np.float32)
-        s = np.concatenate([[0], np.hypot(*np.diff(pts, axis=0).T).cumsum()])
-        s = s / max(s[-1], 1e-6)
-        for (ax, ay), (bx, by), r0, r1, s0, s1 in zip(pts, pts[1:], half, half[1:], s, s[1:]):
-            r = max(r0, r1) + pad
-            x0, x1 = max(int(min(ax, bx) - r), lo[0]), min(int(max(ax, bx) + r) + 2, hi[0])
-            y0, y1 = max(int(min(ay, by) - r), lo[1]), min(int(max(ay, by) + r) + 2, hi[1])
-            if x1 <= x0 or y1 <= y0:
-                continue
-            gx, gy = (np.arange(x0, x1) - ax).astype(np.float32), (np.arange(y0, y1) - ay).astype(np.float32)[:, None]
-            dx, dy = np.float32(bx - ax), np.float32(by - ay)
-            t = np.clip((gx * dx + gy * dy) / (dx * dx + dy * dy + 1e-9), 0, 1)
-            dist = np.hypot(gx - t * dx, gy - t * dy)
-            wide = np.float32(r0) + np.float32(r1 - r0) * t
-            win = slice(y0 - lo[1], y1 - lo[1]), slice(x0 - lo[0], x1 - lo[0])
-            nearer = dist - wide < sdf[win]
-            sdf[win][nearer] = (dist - wide)[nearer]
-            u[win][nearer] = (s0 + (s1 - s0) * t)[nearer]
-            v[win][nearer] = (np.where(dx * gy > dy * gx, dist, -dist) / np.maximum(wide, .5))[nearer]
-        alpha = np.clip(.5 - sdf / soft, 0, 1) * min(1, 2.2 * half.max())
-        if np.ndim(color) == 3:
-            color = cv2.remap(color, u * (color.shape[1] - 1), np.clip(.5 + .5 * v * np.float32(flip), 0, 1) * (color.shape[0] - 1), cv2.INTER_LINEAR)
-        self.put((slice(lo[1], hi[1]), slice(lo[0], hi[0])), alpha, np.asarray(color, np.float32), opacity, own)
-
-    def dot(self, x, y, r, color, opacity=1.0, **more):
-        self.tube([[x, y], [x + .01, y]], r, color, opacity, **more)
-
-    def poly(self, pts, color, opacity=1.0, own=True, rays=None):
-        """Draws a fin or a flat part; rays are lines from one point to the outline's points."""
-        h, w = self.a.shape
-        pts = np.asarray(pts, float)
-        lo = np.maximum(np.floor(pts.min(0)) - 2, 0).astype(int)
-        hi = np.minimum(np.ceil(pts.max(0)) + 3, (w, h)).astype(int)
-        if (hi <= lo).any():
-            return
-        mask = np.zeros((hi[1] - lo[1], hi[0] - lo[0]), np.uint8)
-        cv2.fillPoly(mask, [np.round((pts - lo) * 16).astype(np.int32)], 255, cv2.LINE_AA, 4)
-        light = np.ones(mask.shape, np.float32)
-        if rays is not None:
-            for p in pts:
-                for q in (.35, .7, 1):
-                    end = (np.asarray(rays) * (1 - q) + p * q - lo) * 16
-                    cv2.line(light, tuple(int(c) for c in (np.asarray(rays) - lo) * 16), tuple(int(c) for c in end), .72, 1, cv2.LINE_AA, 4)
-        self.put((slice(lo[1], hi[1]), slice(lo[0], hi[0])), mask / np.float32(255), np.asarray(color, np.float32) * light[..., None], opacity, own)
-
-    def warp(self, m):
-        """Returns the layer moved by a 2 x 3 matrix."""
-        other, size = Layer(1, 1), self.a.shape[::-1]
-        other.rgb, other.a, other.cov = (cv2.warpAffine(p, np.float32(m), size) for p in (self.rgb, self.a, self.cov))
-        return other
-
-    def over(self, image, opacity=1.0):
-        rows, cols = self.a.any(1).nonzero()[0], self.a.any(0).nonzero()[0]
-        if len(rows):
-            win = slice(rows[0], rows[-1] + 1), slice(cols[0], cols[-1] + 1)
-            o = opacity[win] if np.ndim(opacity) else np.full((1, 1), opacity, np.float32)
-            image[win] = image[win] * (1 - (self.a[win] * o)[..., None]) + self.rgb[win] * o[..., None]
-        return image
-
-
-def darken(image, shadow, strength, blur=0):
-    """Darkens a picture where there is shadow (0 to 1), a bit less in blue, as the sky or the room fills it."""
-    if blur:
-        shadow = cv2.GaussianBlur(shadow, (0, 0), blur)
-    return image * (1 - (strength * shadow)[..., None] * np.float32([.94, .98, 1]))
-
-
-class Film:
-    """One film while it is made: its random numbers, its camera, its file and its truth."""
-
-    def __init__(self, folder, kind, seed, size=None, n=None):
-        self.stem, self.kind, self.seed = pathlib.Path(folder) / f"{kind}-{seed}", kind, seed
-        self.rng = rng = np.random.default_rng([zlib.crc32(kind.encode()), seed])
-        self.w, self.h = SIZES[rng.integers(len(SIZES))]
-        self.n, self.s = int(rng.integers(240, 451)), self.w / 640
-        self.blur, self.noise = rng.uniform(.5, .95) * max(self.s, .7), rng.uniform(.9, 2.6)
-        y, x = np.mgrid[-1:1:self.h * 1j, -1:1:self.w * 1j]
-        slope = rng.normal(0, .05, 2)
-        self.lens = ((1 - rng.uniform(.04, .2) * (x * x + y * y) / 2 + slope[0] * x + slope[1] * y)[..., None] * rng.normal(1, .03, 3)).astype(np.float32)
-        self.frames, self.masks = [], []
-        self.part = self.stem.with_suffix(".part.mp4")
-        self.out = subprocess.Popen(
-            f"ffmpeg -v error -y -f rawvideo -pix_fmt bgr24 -s {self.w}x{self.h} -r 30 -i - -c:v libx264 -crf 18 -pix_fmt yuv420p".split()
-            + ["-threads", "1", str(self.part)], stdin=subprocess.PIPE)
-
-    def layer(self):
-        return Layer(self.h, self.w)
-
-    def add(self, image, animal, forward, hide=None, after=None, **more):
-        """Takes the next frame: the picture before the lens, the animal's layer (or cover), what hides it, what the camera prints on it."""
-        image = cv2.GaussianBlur(np.asarray(image, np.float32) * self.lens, (0, 0), self.blur)
-        grain = self.rng.standard_normal((self.h, self.w, 4), np.float32)
-        grain = cv2.GaussianBlur(.8 * grain[..., :3] + .6 * grain[..., 3:], (3, 3), .45) * 1.3
-        image = np.clip(image + grain * (self.noise * np.sqrt(.3 + np.clip(image, 0, 255) / 180)), 0, 255)
-        image = image if after is None else after(image)
-        assert np.isfinite(image).all()
-        self.out.stdin.write(np.clip(image + .5, 0, 255).astype(np.uint8).tobytes())
-        cov = animal.cov if isinstance(animal, Layer) else animal
-        cov = cov if hide is None else cov * (1 - hide)
-        mask, area = cov >= .5, float(cov.sum())
-        self.masks.append(np.packbits(mask))
-        if mask.sum() < 12:
-            self.frames.append({"centroid_px": None, "forward": [0, 0, 0], "box_px": None, "area_px": 0, "absent": True, **more})
-            return
-        x, y, w, h = cv2.boundingRect(mask.astype(np.uint8))
-        long = np.hypot(*forward[:2])
-        ahead = [round(float(forward[0] / long), 5), round(float(forward[1] / long), 5), 0] if long > 1e-6 else [0, 0, 0]
-        at = [float(cov.sum(0) @ np.arange(self.w)) / area, float(cov.sum(1) @ np.arange(self.h)) / area]
-        self.frames.append({"centroid_px": [round(c, 3) for c in at], "forward": ahead, "box_px": [x, y, w, h],
-                            "area_px": round(area, 1), "absent": False, **more})
-
-    def close(self):
-        self.out.stdin.close()
-        assert self.out.wait() == 0
-        seen = [k for k, f in enumerate(self.frames) if not f["absent"]]
-        picks = [seen[i] for i in np.linspace(0, len(seen) - 1, 10).round().astype(int)]
-        masks = np.stack([np.unpackbits(self.masks[k])[:self.h * self.w].reshape(self.h, self.w).astype(bool) for k in picks])
-        np.savez_compressed(f"{self.stem}.masks.npz", frames=np.array(picks), masks=masks)
-        pathlib.Path(f"{self.stem}.truth.json").write_text(json.dumps({"fps": 30, "kind": self.kind, "seed": self.seed, "frames": self.frames}))
-        os.replace(self.part, f"{self.stem}.mp4")
-
-
-# Ways to move.
-
-def roam(film, speed, margin, turn=.1, pace=None, idle=.02):
-    """Returns x, y, heading and the way made, from one far goal to the next; pace (0 to 1 per frame) slows it."""
-    rng, w, h = film.rng, film.w, film.h
-    x0, y0, x1, y1 = margin, margin, w - margin, h - margin
-    goal = lambda: np.array([rng.uniform(x0, x1), rng.uniform(y0, y1)])
-    at, aim, a, rows, way = goal(), goal(), None, [], 0.0
-    fast = speed * film.s * np.exp(.3 * drift(rng, film.n, 25)) * (1 if pace is None else pace)
-    side = .5 * drift(rng, film.n, 18)
-    for k in range(film.n):
-        while np.hypot(*(aim - at)) < max(.12 * (x1 - x0), 3 * speed * film.s):
-            aim = goal()
-        want = np.arctan2(*(aim - at)[::-1]) + side[k]
-        a = want if a is None else a + np.clip((want - a + np.pi) % TAU - np.pi, -1, 1) * turn * min(1, fast[k] / (speed * film.s + 1e-9) + idle)
-        at = at + fast[k] * np.array([np.cos(a), np.sin(a)])
-        at = np.clip(at, (x0, y0), (x1, y1)); way += fast[k]
-        rows.append((*at, a, way))
-    x, y, a, way = np.array(rows).T
-    return smooth(x, 2), smooth(y, 2), smooth(np.unwrap(a), 2), way
-
-
-def glide(film, speed, box, first=None):
-    """Returns x, y, the facing (-1 left to 1 right), the pitch and the swum way of a fish seen from the side."""
-    rng, (x0, y0, x1, y1) = film.rng, box
-    at = np.array(first if first is not None else (rng.uniform(x0, x1), rng.uniform(y0, y1)))
-    rows = []
-    while len(rows) < film.n + 40:
-        goal = np.array([rng.uniform(x0, x1), np.clip(at[1] + rng.normal(0, .3) * (y1 - y0), y0, y1)])
-        if abs(goal[0] - at[0]) < .4 * (x1 - x0):
-            continue
-        m = int(np.hypot(*(goal - at)) / (speed * film.s * rng.uniform(.7, 1.3))) + 2
-        rows += list(at + (goal - at) * np.linspace(0, 1, m, endpoint=False)[:, None]); at = goal
-    x, y = (smooth(c, 7)[:film.n] for c in np.array(rows).T)
-    vx, vy = np.gradient(x), np.gradient(y)
-    face = smooth(np.where(vx > 0, 1.0, -1.0), 3)
-    pitch = np.clip(smooth(np.arctan2(-vy, np.abs(vx) + .3), 5), -.38, .38)
-    return x, y, face, pitch, np.hypot(vx, vy).cumsum()
-
-
-def lag(curve, k, frames):
-    return np.interp(k - frames, np.arange(len(curve)), curve)
-
-
-def spine(x, y, angles, length):
-    """Returns the points of a body from its nose on; angles are where each piece points (forward)."""
-    pieces = length / len(angles) * np.stack([np.cos(angles), np.sin(angles)], 1)
-    return np.array([x, y]) - np.concatenate([[[0, 0]], pieces.cumsum(0)])
-
-
-def aside(pts, u, out):
-    """Returns a point beside a spine: at u (0 nose to 1 tail), out px to its left or right."""
-    i = u * (len(pts) - 1); j = min(int(i), len(pts) - 2)
-    d = pts[j] - pts[j + 1]; d = d / (np.hypot(*d) + 1e-9)
-    return pts[j] + (pts[j + 1] - pts[j]) * (i - j) + out * np.array([-d[1], d[0]]), d
-
-
-def fish_color(rng, dark=None):
-    hues = [[40, 45, 50], [55, 75, 85], [30, 90, 190], [60, 120, 200], [120, 130, 140], [150, 110, 60], [70, 60, 120]]
-    hues = hues[:2] if dark else hues
-    return np.clip(np.array(hues[rng.integers(len(hues))]) * rng.uniform(.8, 1.2) + rng.normal(0, 8, 3), 15, 235)
-
-
-def top_fish(film, length, color=None, wide=None, look=None):
-    """Returns draw(layer, x, y, angles, phase, beat): a fish from above, its nose at x, y."""
-    rng = film.rng
-    color = fish_color(rng) if color is None else color
-    patch, bands, spots = look or (rng.uniform() < .6 and rng.uniform(.55, 1.4), rng.choice([0, 0, 7]), rng.choice([0, .4]))
-    tex = skin(rng, color, patch=color * patch if patch else None, bands=bands, spots=spots)
-    u = np.linspace(0, 1, 31)
-    half = length * (wide or rng.uniform(.085, .12)) * np.interp(u, [0, .04, .12, .26, .5, .75, .86, 1], [.3, .55, .85, 1, .8, .36, .2, .1])
-
-    def draw(layer, x, y, angles, phase=0.0, beat=1.0):
-        v = np.linspace(0, 1, 30)
-        pts = spine(x, y, angles + beat * (.5 * v ** 1.3 - .06) * np.sin(phase - 4.5 * v), length)
-        for side in (-1, 1):
-            (root, d), flap = aside(pts, .27, side * half[8] * .8), .25 * np.sin(phase * .5 + side)
-            n = side * np.array([-d[1], d[0]])
-            fin = [root + length * (a * -d + b * n) for a, b in ((-.02, 0), (.02, .08 + .03 * flap), (.09, .13 + .05 * flap), (.13, .09), (.07, 0))]
-            layer.poly(fin, color * .85 + 12, .55, rays=root)
-        end, d = aside(pts, .93, 0); n = np.array([-d[1], d[0]]); bend = .02 * np.sin(phase - 6) * beat
-        layer.poly([end, end + length * (-.06 * d + (.018 + bend) * n), end + length * (-.11 * d + bend * 2 * n), end + length * (-.06 * d + (bend - .018) * n)], color * .8, .6)
-        layer.tube(pts, half, tex)
-        layer.tube([aside(pts, q, 0)[0] for q in (.38, .48, .6)], [.2, length * .009, .2], color * .45, .8)
-        for side in (-1, 1):
-            eye = aside(pts, .1, side * half[3] * .78)[0]
-            layer.dot(*eye, length * .016, [12, 12, 12]); layer.dot(eye[0] - length * .004, eye[1] - length * .004, length * .005, [200] * 3, .7)
-        return pts
-    return draw
-
-
-def side_fish(film, length, color=None, tall=None):
-    """Returns draw(layer, x, y, face, pitch, phase): a fish from the side, its middle at x, y."""
-    rng = film.rng
-    color = fish_color(rng) if color is None else np.asarray(color, float)
-    tall = tall or rng.uniform(.13, .2)
-    tex = skin(rng, color, belly=mix(color, [200, 210, 215], rng.uniform(.3, .8)), bands=rng.choice([0, 0, 4, 6]), spots=rng.choice([0, .35]), grain=.12, cell=14)
-    fin, fork, u = mix(color, rng.uniform(60, 200, 3), .3), rng.uniform(.0, .09), np.linspace(0, .84, 26)
-    half = length * tall * np.interp(u, [0, .03, .1, .2, .34, .55, .72, .84], [.1, .38, .68, .9, 1, .78, .4, .28])
-
-    def draw(layer, x, y, face, pitch, phase=0.0, beat=1.0):
-        c, s, wave = np.cos(pitch), np.sin(pitch), beat * (.5 + .5 * np.sin(phase))
-        f = np.copysign(max(abs(face), .22), face)
-
-        def at(u, v=0.0):  # u from nose to tail, v upward, in lengths
-            ahead = length * (.5 - u + .07 * wave * np.maximum(u - .4, 0)); v = v * length
-            return np.stack([x + f * (ahead * c - v * s), y - ahead * s - v * c], -1)
-        tip = .1 + .02 * np.sin(phase)
-        layer.poly([at(.8, .045), at(.92, tip), at(1, tip * 1.25), at(1 - fork, .0), at(1, -tip * 1.25), at(.92, -tip), at(.8, -.045)], fin, .72, rays=at(.8))
-        layer.poly([at(.3, tall * .9), at(.38, tall * 1.45), at(.5, tall * 1.4), at(.64, tall * 1.05), at(.66, tall * .5)], fin, .7, rays=at(.42, tall * .6))
-        layer.poly([at(.55, -tall * .65), at(.62, -tall * 1.2), at(.7, -tall * .95), at(.72, -tall * .3)], fin, .65, rays=at(.58, -tall * .4))
-        layer.poly([at(.36, -tall * .9), at(.45, -tall * 1.3), at(.48, -tall * .8)], fin, .65)
-        layer.tube(at(u), half, tex, flip=-1 if f > 0 else 1)
-        layer.tube([at(.19, tall * .55), at(.225, .1 * tall), at(.2, -tall * .5)], length * .006, color * .5, .55)
-        flap = .05 + .035 * np.sin(phase * .6 + 1)
-        layer.poly([at(.26, -.1 * tall), at(.36, -.1 * tall + flap), at(.39, -.35 * tall - flap), at(.3, -.4 * tall)], fin * .85, .7, rays=at(.26, -.2 * tall))
-        if abs(face) > .25:
-            eye, r = at(.085, tall * .22), length * .02
-            layer.dot(*eye, r * 1.25, mix(color, [190, 205, 210], .6)); layer.dot(*eye, r * .8, [14, 14, 14])
-            layer.dot(eye[0] - r * .3, eye[1] - r * .35, r * .25, [235] * 3, .9)
-    return draw
-
-
-def apart(color, image, by=38):
-    """Returns a color made darker or lighter, so that it differs from the place."""
-    tone = image.mean()
-    if abs(color.mean() - tone) > by:
-        return color
-    return np.clip(color * (tone - by if tone > 95 else tone + by * 1.6) / color.mean(), 8, 240)
-
-
-def facing(face, pitch):
-    return (0, 0) if abs(face) < .3 else (np.sign(face) * np.cos(pitch), -np.sin(pitch))
-
-
-def rodent(film, length, color, paws, nose=None, tail=True, below=False):
-    """Returns draw(layer, x, y, angles, step): a mouse or rat from above (or below), the tip of its nose at x, y."""
-    rng = film.rng
-    tex = skin(rng, color, patch=color * rng.uniform(.88, 1.12), grain=.09, shine=.08, rough=.5, cell=10)
-    u = np.linspace(0, 1, 25); pink = np.asarray(paws, float)
-    half = length * rng.uniform(.92, 1.1) * np.interp(u, [0, .05, .16, .28, .42, .68, .88, 1], [.022, .05, .095, .095, .125, .165, .125, .05])
-    if nose is not None:
-        t = step(np.linspace(0, 1, tex.shape[1]), .1, .2)[None, :, None]
-        tex = (nose * (.7 + .3 * tex / tex.mean()) * (1 - t) + tex * t).astype(np.float32)
-
-    def draw(layer, x, y, angles, way, sway=0.0):
-        a = np.interp(np.linspace(0, 1, 24), np.linspace(0, 1, len(angles)), angles)
-        pts = spine(x, y, a, length); ph = TAU * way / (length * .75)
-        if tail:
-            end, d = aside(pts, .97, 0); b = np.arctan2(d[1], d[0]) + .5 * np.sin(np.linspace(0, 3.4, 16) + sway) * np.linspace(.2, 1, 16)
-            layer.tube(spine(*end, b, length * .85), length * np.linspace(.028, .009, 17), skin_of(pink * .85))
-
-        def limb(q, side, reach, shift, size):
-            swing = np.sin(ph + shift)
-            (hip, d), n = aside(pts, q, side * half[int(q * 24)] * .6), None
-            n = side * np.array([-d[1], d[0]])
-            foot = hip + length * (reach * n + (.06 + .085 * swing) * d)
-            layer.tube([hip, (hip + foot) / 2, foot], length * np.array([.04, .03, .022]), color * .8 if not below else mix(color, pink, .5), soft=1.5)
-            layer.tube([foot, foot + length * size * d], length * np.array([.022, .024]), pink)
-            for toe in (-.5, 0, .5):
-                layer.tube([foot + length * size * d, foot + length * (size * 1.5 * d + size * .55 * toe * n)], length * .008, pink * .95)
-        limbs = [(.33, 1, .10, 0, .035), (.33, -1, .10, np.pi, .035), (.78, 1, .13, np.pi, .075), (.78, -1, .13, 0, .075)]
-        if not below:
-            [limb(*l) for l in limbs]
-        layer.tube(pts, half, tex, soft=1.8)
-        if below:
-            [limb(*l) for l in limbs]
-        for side in (-1, 1):
-            ear = aside(pts, .22, side * half[5] * 1.0)[0]
-            layer.dot(*ear, length * .047, mix(color, pink, .35), soft=1.6); layer.dot(*ear, length * .026, mix(color * .8, pink, .6), .8, soft=1.5)
-            if not below:
-                layer.dot(*aside(pts, .11, side * half[3] * .7)[0], length * .014, [10, 10, 10])
-        layer.dot(*pts[0], length * .016, mix(pink, [90, 90, 160], .4) if nose is None else nose * .92)
-        return pts
-    return draw
-
-
-def skin_of(color):
-    """Returns a small plain round texture."""
-    v = np.linspace(-1, 1, 16)[:, None, None]
-    return (np.asarray(color, np.float32) * (.5 + .5 * np.sqrt(np.clip(1 - .9 * v * v, 0, 1))) * np.ones((16, 8, 1))).astype(np.float32)
-
-
-# The kinds. Each gets a film and adds its frames.
 
 def station(film):
     rng, h, w, s = film.rng, film.h, film.w, film.s
@@ -550,7 +20,8 @@ def station(film):
     x, y = np.mgrid[:w, :h].transpose(0, 2, 1)
     along = x if film.seed % 2 else y
     p = rng.uniform(22, 50) * s
-    image *= 1 - rng.uniform(.25, .55) * (.5 + .5 * np.clip(3 * np.sin(TAU * along / p), -1, 1))[..., None] * (1 + .15 * fractal(rng, h, w, 30, 4)[..., None])
+    stripes = rng.uniform(.25, .55) * (.5 + .5 * np.clip(3 * np.sin(TAU * along / p), -1, 1))
+    image *= 1 - (stripes * (1 + .15 * fractal(rng, h, w, 30, 4)))[..., None]
     wall = int(h * rng.uniform(.08, .15))
     for rows in (slice(0, wall), slice(h - wall, h)):
         image[rows] = mix(image[rows], rng.uniform(60, 120, 3), .75) * (1 + .05 * fractal(rng, wall, w, 30, 4, .6, (8, 1))[..., None])
@@ -562,18 +33,13 @@ def station(film):
     phase, turn = TAU * np.cumsum(f0 / 30 * (1 + .12 * drift(rng, film.n, 20))), .03 * drift(rng, film.n, 30)
     motes = rng.uniform(0, 1, (25, 4))
     for k in range(film.n):
-        layer, frame = film.layer(), image.copy()
+        layer = film.layer()
         pts = fish(layer, x0 + dx[k], y0 + dy[k], np.pi + turn[k] + np.zeros(30), phase[k], 1.0)
-        shade = film.layer(); shade.a = cv2.warpAffine(layer.cov, np.float32([[1, 0, 7 * s], [0, 1, 10 * s]]), (w, h))
-        frame = layer.over(darken(frame, shade.a, .22, 5 * s))
+        frame = film.lit(image, layer, 7, 10, .22, 5)
         for q, r, v, c in motes:  # what the current carries along
             mx, my = (q + k * (.012 + .008 * v)) % 1.2 * w - .1 * w, wall + r * (h - 2 * wall)
             drop = film.layer(); drop.tube([[mx, my], [mx + 5 * s, my]], .6 * s, [200 * c + 30] * 3, .35); drop.over(frame)
-        cover = layer.cov
-        ahead = pts[0] - pts[20]
-        if not left:
-            frame, cover, ahead = frame[:, ::-1], cover[:, ::-1], ahead * (-1, 1)
-        film.add(frame, cover, ahead)
+        yield film.frame(*turned(not left, frame, layer.cov, pts[0] - pts[20]))
 
 
 def slow_crawler(film):
@@ -583,9 +49,12 @@ def slow_crawler(film):
     length = w * (rng.uniform(.2, .32) if what != "worm" else rng.uniform(.16, .26))
     if agar:
         image = (rng.uniform(140, 190) + rng.normal(0, 6, 3)) * (1 + .035 * fractal(rng, h, w, w / 2, 7, .55)[..., None])
-        cv2.circle(image, (int(w * rng.uniform(.4, .6)), int(h * rng.uniform(.4, .6))), int(.52 * w), (image.mean((0, 1)) * .6).tolist(), int(5 * s), cv2.LINE_AA)
+        tone = lambda by: (image.mean((0, 1)) * by).tolist()
+        middle = int(w * rng.uniform(.4, .6)), int(h * rng.uniform(.4, .6))
+        cv2.circle(image, middle, int(.52 * w), tone(.6), int(5 * s), cv2.LINE_AA)
         for _ in range(120):
-            cv2.circle(image, (int(rng.integers(w)), int(rng.integers(h))), int(rng.integers(1, 3)), (image.mean((0, 1)) * rng.uniform(.5, 1.15)).tolist(), -1, cv2.LINE_AA)
+            at, r = (int(rng.integers(w)), int(rng.integers(h))), int(rng.integers(1, 3))
+            cv2.circle(image, at, r, tone(rng.uniform(.5, 1.15)), -1, cv2.LINE_AA)
     else:
         image = litter(rng, h, w)
     colors = {"slug": [35, 50, 70], "worm": [110, 125, 160], "caterpillar": [60, 150, 120]}
@@ -596,16 +65,20 @@ def slow_crawler(film):
     made = length * rng.uniform(.35, .75) * np.linspace(0, 1, film.n)
     made = smooth(made + length * .012 * np.sin(np.arange(film.n) / 30 * TAU * rng.uniform(.4, .8)), 2)
     a0, trail = rng.uniform(0, TAU), np.arange(0, 3 * length, 1.0)  # the way it takes, one point a px
-    bend = rng.uniform(.3, .6) * drift(rng, len(trail), length * .3) if what != "worm" else .75 * np.sin(TAU * trail / length / rng.uniform(.55, .8))
+    if what == "worm":
+        bend = .75 * np.sin(TAU * trail / length / rng.uniform(.55, .8))
+    else:
+        bend = rng.uniform(.3, .6) * drift(rng, len(trail), length * .3)
     way = np.cumsum(np.stack([np.cos(a0 + bend), np.sin(a0 + bend)], 1), 0)
     way += (w / 2, h / 2) - way[int(1.55 * length)]
     u = np.linspace(0, 1, 34)
+    wide = length * thick * np.interp(u, [0, .05, .15, .5, .8, 1], [.45, .75, .9, 1, .8, .6 if what == "caterpillar" else .12])
     for k in range(film.n):
         layer, head = film.layer(), 1.2 * length + made[k]
         squeeze = np.sin(TAU * (2 * u - k / 30 * .7))
         where = head - length * (u + (.018 * squeeze if what != "worm" else 0))
         pts = np.stack([np.interp(where, trail, c) for c in way.T], 1)
-        half = length * thick * np.interp(u, [0, .05, .15, .5, .8, 1], [.45, .75, .9, 1, .8, .12 if what != "caterpillar" else .6]) * (1 - .1 * squeeze * (what != "worm"))
+        half = wide * (1 - .1 * squeeze * (what != "worm"))
         d = pts[0] - pts[2]; d = d / np.hypot(*d); n = np.array([-d[1], d[0]])
         if what == "slug":
             for side, q in ((-1, .11), (1, .1), (-.6, .05), (.6, .05)):
@@ -622,8 +95,7 @@ def slow_crawler(film):
             layer.tube(pts[4:13], half[4:13] * .78, tex * .82, .8)
         if what == "caterpillar":
             layer.dot(*pts[0], length * .045, color * .35)
-        shade = cv2.warpAffine(layer.cov, np.float32([[1, 0, 3 * s], [0, 1, 4 * s]]), (w, h))
-        film.add(layer.over(darken(image.copy(), shade, .4, 2.5 * s)), layer, pts[0] - pts[-1])
+        yield film.frame(film.lit(image, layer, 3, 4, .4, 2.5), layer, pts[0] - pts[-1])
 
 
 def head_fixed(film):
@@ -638,7 +110,8 @@ def head_fixed(film):
     nose = np.array([x0, y0]) + d * length * .45
     gel = film.layer()  # the cut edge of the agarose that holds the head
     cut = [nose + length * (-.3 * d + v * n + .05 * np.sin(v * 6 + 1) * d) for v in np.linspace(-3, 3, 40)]
-    gel.tube(cut, 3.2 * s, [light * .6] * 3, .6, soft=3); gel.tube(np.array(cut) - d * 4 * s, 1.5 * s, [min(light * 1.35, 250)] * 3, .6, soft=3)
+    gel.tube(cut, 3.2 * s, [light * .6] * 3, .6, soft=3)
+    gel.tube(np.array(cut) - d * 4 * s, 1.5 * s, [min(light * 1.35, 250)] * 3, .6, soft=3)
     image = gel.over((image[..., None] * rng.normal(1, .02, 3)).astype(np.float32))
     for _ in range(60):
         spot = film.layer(); px, py, r = rng.uniform(0, w), rng.uniform(0, h), rng.exponential(2.2) * s + .6
@@ -657,14 +130,16 @@ def head_fixed(film):
         pts = spine(*nose, angles, length); u = np.linspace(0, 1, 35)
         layer.tube(pts[8:], length * .045 * np.interp(u[8:], [.24, .5, .9, 1], [.9, .75, .6, .1]), [light * .85] * 3, .45)  # the fin fold
         layer.tube(pts[8:], length * .034 * np.interp(u[8:], [.24, .5, .9, 1], [1, .55, .22, .1]), tail, .9)
-        layer.tube(pts[:13], length * .075 * np.interp(u[:13], [0, .03, .1, .17, .26, .36], [.4, .75, .98, .85, .75, .4]), tex, .92, soft=1.5)
+        skull = length * .075 * np.interp(u[:13], [0, .03, .1, .17, .26, .36], [.4, .75, .98, .85, .75, .4])
+        layer.tube(pts[:13], skull, tex, .92, soft=1.5)
         for side in (-1, 1):
             layer.tube([aside(pts, .065, side * length * .058)[0], aside(pts, .115, side * length * .062)[0]], length * .026, [18, 18, 20])
             (root, fd), flap = aside(pts, .2, side * length * .05), .03 * np.sin(phase[k] * .7) * abs(beat[k])
             fn = side * np.array([-fd[1], fd[0]])
-            layer.poly([root, root + length * (.02 * -fd + (.05 + flap) * fn), root + length * (.08 * -fd + (.045 + flap) * fn), root - length * .06 * fd], [light * .8] * 3, .4)
+            fin = [root + length * (-back * fd + out * fn) for back, out in ((0, 0), (.02, .05 + flap), (.08, .045 + flap), (.06, 0))]
+            layer.poly(fin, [light * .8] * 3, .4)
         layer.tube(pts[8:11], length * .03, [light * .25] * 3, .6, soft=2)  # the swim bladder
-        film.add(layer.over(image.copy()), layer, d)
+        yield film.frame(layer.over(image.copy()), layer, d)
 
 
 def resting_mirror(film):
@@ -682,8 +157,8 @@ def resting_mirror(film):
     x1, y1 = box[0] + rng.uniform(-.03, .08) * w, floor - tall - 2 * s
     gx, gy, gf, gp, gw = glide(film, 3.2, box, first=(x1, y1))
     t = np.arange(film.n); moved = np.maximum(t - rest, 0)
-    x = np.where(t < rest, x1 + .8 * s * drift(rng, film.n, 50), lag(gx, moved, 0)); y = np.where(t < rest, y1 + .6 * s * np.sin(t / 31), lag(gy, moved, 0))
-    x, y = smooth(x, 2), smooth(y, 2)
+    x = smooth(np.where(t < rest, x1 + .8 * s * drift(rng, film.n, 50), lag(gx, moved, 0)), 2)
+    y = smooth(np.where(t < rest, y1 + .6 * s * np.sin(t / 31), lag(gy, moved, 0)), 2)
     face = np.where(t < rest, gf[0], lag(gf, moved, 0)); pitch = smooth(np.where(t < rest, -.03, lag(gp, moved, 0)), 3)
     phase = np.cumsum(np.where(t < rest, .1, .5) * (1 + .2 * drift(rng, film.n, 20)))
     dim, side = rng.uniform(.35, .55), rng.uniform(.25, .4)
@@ -691,13 +166,11 @@ def resting_mirror(film):
     for k in range(film.n):
         layer = film.layer(); fish(layer, x[k], y[k], face[k], pitch[k], phase[k], .25 if k < rest else 1)
         frame = image.copy()
-        low = layer.warp([[1, 0, 0], [0, -1, 2 * floor]]); low.rgb, low.a = cv2.GaussianBlur(low.rgb, (0, 0), 1.0 * s), cv2.GaussianBlur(low.a, (0, 0), 1.0 * s)
+        low = layer.warp([[1, 0, 0], [0, -1, 2 * floor]])
+        low.rgb, low.a = (cv2.GaussianBlur(picture, (0, 0), 1.0 * s) for picture in (low.rgb, low.a))
         low.over(frame, (dim * soft * below).astype(np.float32))
         layer.warp([[-1, 0, 2 * wall], [0, 1, 0]]).over(frame, (side * soft * (beyond & ~below)).astype(np.float32))
-        frame, cover, ahead = layer.over(frame), layer.cov, facing(face[k], pitch[k])
-        if right:
-            frame, cover, ahead = frame[:, ::-1], cover[:, ::-1], (-ahead[0], ahead[1])
-        film.add(frame, cover, ahead)
+        yield film.frame(*turned(right, layer.over(frame), layer.cov, facing(face[k], pitch[k])))
 
 
 def side_mirror(film):
@@ -708,7 +181,8 @@ def side_mirror(film):
     gy, gx = np.mgrid[:h, :w].astype(np.float32)
     depth = ((gx - px) * nx + (gy - py) * ny).astype(np.float32)
     image = tank(rng, h, w, floor=.88)
-    copy = cv2.remap(image, gx - 2 * depth * np.float32(nx), gy - 2 * depth * np.float32(ny), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+    behind = gx - 2 * depth * np.float32(nx), gy - 2 * depth * np.float32(ny)
+    copy = cv2.remap(image, *behind, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
     beyond = step(-depth, -.7, .7)
     image = mix(image, copy * .75 + 10, beyond[..., None]) * (1 - .45 * np.exp(-(depth / (1.6 * s)) ** 2)[..., None])
     m = [[1 - 2 * nx * nx, -2 * nx * ny, 2 * nx * (nx * px + ny * py)], [-2 * nx * ny, 1 - 2 * ny * ny, 2 * ny * (nx * px + ny * py)]]
@@ -721,10 +195,7 @@ def side_mirror(film):
         layer = film.layer(); fish(layer, x[k], y[k], face[k], pitch[k], way[k] / length * 9)
         mirror = layer.warp(m); frame = mirror.over(image.copy(), strength * beyond)
         layer.rgb *= (1 - beyond)[..., None]; layer.a *= 1 - beyond; layer.cov *= 1 - beyond
-        frame, cover, ahead = layer.over(frame), layer.cov, facing(face[k], pitch[k])
-        if right:
-            frame, cover, ahead = frame[:, ::-1], cover[:, ::-1], (-ahead[0], ahead[1])
-        film.add(frame, cover, ahead)
+        yield film.frame(*turned(right, layer.over(frame), layer.cov, facing(face[k], pitch[k])))
 
 
 def cast_shadow(film):
@@ -739,7 +210,7 @@ def cast_shadow(film):
         layer = film.layer(); fish(layer, x[k], y[k], face[k], pitch[k], way[k] / length * 9)
         m = np.float32([[big, 0, dx + (1 - big) * x[k]], [0, big, dy + (1 - big) * y[k]]])
         shade = cv2.warpAffine(cv2.GaussianBlur(layer.a, (0, 0), soft), m, (w, h))
-        film.add(layer.over(darken(image.copy(), shade, dark)), layer, facing(face[k], pitch[k]))
+        yield film.frame(layer.over(darken(image.copy(), shade, dark)), layer, facing(face[k], pitch[k]))
 
 
 def lamp_shadow(film):
@@ -759,8 +230,9 @@ def lamp_shadow(film):
         back = film.layer(); mid = pts[4:22]; back.tube(mid, length * .1, [0, 0, 0])
         for t in steps:  # higher parts fall farther, and softer
             part = cv2.GaussianBlur(body if t == 0 else back.cov, (0, 0), (.8 + 3 * t) * s)
-            shade = np.maximum(shade, cv2.warpAffine(part, np.float32([[1, 0, t * length * np.cos(lamp)], [0, 1, t * length * np.sin(lamp)]]), (w, h)) * (1 - .25 * t))
-        film.add(layer.over(darken(image.copy(), shade, dark)), layer, pts[0] - pts[18])
+            m = np.float32([[1, 0, t * length * np.cos(lamp)], [0, 1, t * length * np.sin(lamp)]])
+            shade = np.maximum(shade, cv2.warpAffine(part, m, (w, h)) * (1 - .25 * t))
+        yield film.frame(layer.over(darken(image.copy(), shade, dark)), layer, pts[0] - pts[18])
 
 
 def two_tone(film):
@@ -776,36 +248,7 @@ def two_tone(film):
     x, y, a, way = roam(film, 2.8, .24 * w, .11, step(drift(rng, film.n, 30), -1.3, -.6))
     for k in range(film.n):
         layer = film.layer(); pts = mouse(layer, x[k], y[k], lag(a, k, np.linspace(0, 9, 24)), way[k], way[k] / length * 2)
-        shade = cv2.warpAffine(layer.cov, np.float32([[1, 0, 2 * s], [0, 1, 3 * s]]), (w, h))
-        film.add(layer.over(darken(image.copy(), shade, .12 if below else .3, (6 if below else 3) * s)), layer, pts[0] - pts[18])
-
-
-def insect(film, length, color, kind="ant"):
-    """Returns draw(layer, x, y, angle, way): an ant or a beetle from above, its middle at x, y."""
-    rng = film.rng
-    tex = skin(rng, color, grain=.08, shine=.5 if kind == "ant" else .3, rough=.55)
-    ant = [(.36, .1, .085), (.08, .12, .06), (-.12, .03, .03), (-.33, .17, .1)]
-    beetle = [(.42, .06, .09), (.24, .08, .16), (-.17, .29, .2)]
-    parts = ant if kind == "ant" else beetle
-
-    def draw(layer, x, y, a, way, feel=0.0):
-        turn = np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]])
-        at = lambda u, v: np.array([u, v]) @ turn * length + (x, y)
-        ph = TAU * way / (length * .7)
-        for i, (root, out, ahead) in enumerate(((.14, .36, .26), (.06, .42, -.02), (-.02, .4, -.34))):
-            for side in (-1, 1):
-                swing = .1 * np.sin(ph + np.pi * ((i + (side > 0)) % 2))
-                layer.tube([at(root, .05 * side), at(root + ahead * .45 + swing * .6, side * out * .62), at(root + ahead + swing, side * out)],
-                           length * np.array([.02, .017, .01]), color * .75)
-        for side in (-1, 1):
-            layer.tube([at(.42, .03 * side), at(.53, .13 * side), at(.66, side * (.12 + .04 * np.sin(feel + side)))], length * .01, color * .8)
-        for u, long, wide in parts[::-1]:
-            v = np.linspace(-1, 1, 9)
-            layer.tube([at(u - q * long * .9, 0) for q in v], length * wide * np.sqrt(1.02 - v * v * .9), tex)
-        if kind != "ant":
-            layer.tube([at(.08, 0), at(-.45, 0)], length * .006, color * .3, .9)
-        return turn[0]
-    return draw
+        yield film.frame(film.lit(image, layer, 2, 3, .12 if below else .3, (6 if below else 3)), layer, pts[0] - pts[18])
 
 
 def stop_and_go(film):
@@ -821,8 +264,7 @@ def stop_and_go(film):
     x, y, a, way = roam(film, 3.4, .1 * w, .16, pace, 0)
     for k in range(film.n):
         layer = film.layer(); d = ant(layer, x[k], y[k], a[k], way[k], way[k] * .3)
-        shade = cv2.warpAffine(layer.cov, np.float32([[1, 0, 1.5 * s], [0, 1, 2 * s]]), (w, h))
-        film.add(layer.over(darken(image.copy(), shade, .3, 1.5 * s)), layer, d)
+        yield film.frame(film.lit(image, layer, 1.5, 2, .3, 1.5), layer, d)
 
 
 def ripple(film):
@@ -836,15 +278,14 @@ def ripple(film):
     reach = rng.uniform(3, 4)
     for k in range(film.n):
         layer = film.layer(); pts = fish(layer, x[k], y[k], lag(a, k, np.linspace(0, 10, 30)), way[k] / length * 7, .8)
-        shade = cv2.warpAffine(layer.cov, np.float32([[1, 0, 8 * s], [0, 1, 12 * s]]), (w, h))
-        frame = layer.over(darken(image.copy(), shade, .3, 4 * s))
+        frame = film.lit(image, layer, 8, 12, .3, 4)
         dx, dy, bright = np.zeros((h, w), np.float32), np.zeros((h, w), np.float32), np.zeros((h, w), np.float32)
         for f, b, speed, p in waves:
             arg = f * (gx * np.float32(np.cos(b)) + gy * np.float32(np.sin(b))) - np.float32(TAU * speed * k / 30 - p)
             c = np.cos(arg); dx += c * np.float32(np.cos(b)); dy += c * np.float32(np.sin(b)); bright -= np.sin(arg)
         dx, dy = (reach / 2.6 * d for d in (dx, dy))
         warp = lambda p: cv2.remap(p, gx + dx, gy + dy, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
-        film.add(warp(frame) * (1 + .035 * bright)[..., None], warp(layer.cov), pts[0] - pts[20])
+        yield film.frame(warp(frame) * (1 + .035 * bright)[..., None], warp(layer.cov), pts[0] - pts[20])
 
 
 def shoal(film):
@@ -877,24 +318,7 @@ def shoal(film):
             layers[i].over(frame)
             if list(order).index(i) > list(order).index(13):
                 hide = np.maximum(hide, layers[i].a)
-        others = []
-        for i in range(13):
-            c = layers[i].cov; area = float(c.sum())
-            others.append([round(float(c.sum(0) @ np.arange(w)) / area, 2), round(float(c.sum(1) @ np.arange(h)) / area, 2)])
-        film.add(frame, layers[13], ahead, hide, others=others)
-
-
-def ribbons(film, x, width, n, top, color):
-    """Returns a clump of water plants: broad ribbons from the floor up, drawn once."""
-    rng, h, s = film.rng, film.h, film.s
-    layer = film.layer()
-    for _ in range(n):
-        u = np.linspace(0, 1, 14); lean = rng.normal(0, .08) * h
-        high = h * rng.uniform(top, top + .25)
-        px = x + rng.uniform(-.5, .5) * width + lean * u ** 1.5 + 5 * s * np.sin(u * rng.uniform(4, 8) + rng.uniform(0, 6))
-        tex = skin(rng, color * rng.uniform(.7, 1.25), grain=.12, shine=.1, rough=.3, bands=0)
-        layer.tube(np.stack([px, h + 10 - (h - high) * u], 1), s * rng.uniform(4, 8) * np.interp(u, [0, .3, .85, 1], [.7, 1, .8, .15]), tex)
-    return layer
+        yield film.frame(frame, layers[13], ahead, hide, others=[center_of(layers[i].cov) for i in range(13)])
 
 
 def plants(film):
@@ -904,8 +328,11 @@ def plants(film):
     fish = side_fish(film, length, color=rng.choice([[40, 100, 210], [190, 180, 175], [60, 60, 70], [40, 160, 220]]))
     x, y, face, pitch, way = glide(film, rng.uniform(2, 3.4), (.4 * length, .2 * h, w - .4 * length, .78 * h))
     left, green = rng.uniform(.05, .6) * w, np.array([50, 120, 70]) * rng.uniform(.7, 1.2) + rng.normal(0, 12, 3)
-    clumps = [(ribbons(film, left + .33 * w * (i + .5) / 6, .07 * w, int(rng.integers(3, 6)), rng.uniform(.1, .4), green * (.65 if i % 2 else 1)), i % 2,
-               rng.uniform(.2, .5), rng.uniform(0, TAU), rng.uniform(6, 14) * s) for i in range(6)]
+    clumps = []
+    for i in range(6):
+        n, top = int(rng.integers(3, 6)), rng.uniform(.1, .4)
+        leaves = ribbons(film, left + .33 * w * (i + .5) / 6, .07 * w, n, top, green * (1, .65)[i % 2])
+        clumps.append((leaves, i % 2, rng.uniform(.2, .5), rng.uniform(0, TAU), rng.uniform(6, 14) * s))
     gy, gx = np.mgrid[:h, :w].astype(np.float32)
     high = np.clip((h - gy) / h, 0, 1) ** 1.4
 
@@ -913,7 +340,8 @@ def plants(film):
         layer, _, f, p, reach = clump
         cols = layer.a.any(0).nonzero()[0]; win = slice(None), slice(max(cols[0] - int(3 * reach), 0), cols[-1] + int(3 * reach) + 1)
         t, moved = k / 30 * TAU * f + p, film.layer()
-        by = gx[win] + high[win] * np.float32(reach * (np.sin(t) + .35 * np.sin(2.3 * t))) + 2 * s * np.sin(gy[win] / (25 * s) - t * 1.5) * high[win]
+        by = gx[win] + high[win] * np.float32(reach * (np.sin(t) + .35 * np.sin(2.3 * t)))
+        by = by + 2 * s * np.sin(gy[win] / (25 * s) - t * 1.5) * high[win]
         for name in ("rgb", "a"):
             getattr(moved, name)[win] = cv2.remap(getattr(layer, name), by, gy[win], cv2.INTER_LINEAR)
         return moved
@@ -926,9 +354,8 @@ def plants(film):
         for clump in clumps:
             if not clump[1]:
                 leaf = swayed(clump, k); leaf.over(frame); hide = np.maximum(hide, leaf.a)
-        whole = layer.cov; area = max(float(whole.sum()), 1e-6)
-        at = [round(float(whole.sum(0) @ np.arange(w)) / area, 2), round(float(whole.sum(1) @ np.arange(h)) / area, 2)]
-        film.add(frame, layer, facing(face[k], pitch[k]), hide, whole_px=at, hidden=round(float((whole * hide).sum()) / area, 3))
+        hidden = float((layer.cov * hide).sum()) / max(float(layer.cov.sum()), 1e-6)
+        yield film.frame(frame, layer, facing(face[k], pitch[k]), hide, whole_px=center_of(layer.cov), hidden=round(hidden, 3))
 
 
 def everyday(film, *whats):
@@ -955,24 +382,10 @@ def everyday(film, *whats):
         path = roam(film, 2.8, .2 * w, .08)
     x, y, a, way = path
     for k in range(film.n):
-        layer = film.layer(); pts = body(layer, x[k], y[k], lag(a, k, np.linspace(0, 9, 30)), way[k] * (rate / length if rate > 1 else 1), .8)
+        layer = film.layer()
+        pts = body(layer, x[k], y[k], lag(a, k, np.linspace(0, 9, 30)), way[k] * (rate / length if rate > 1 else 1), .8)
         shade = cv2.warpAffine(layer.cov, np.float32([[1, 0, 3 * s], [0, 1, 5 * s]]), (w, h))
         yield darken(image.copy(), shade, .3, 3 * s), layer, pts[0] - pts[18]
-
-
-def yard(rng, h, w, line):
-    """A garden or a pen from a low view: something out of focus behind, ground before."""
-    back = (rng.uniform(60, 120, 3) * [.75, 1.1, .85]) * (1 + .25 * cv2.GaussianBlur(fractal(rng, h, w, w / 7, 6, .7), (0, 0), w / 130))[..., None]
-    flat = ground(rng, h, w, gravel, soil, sand, bedding)
-    flat = cv2.resize(flat[:, int(.1 * w):int(.9 * w)], (w, int(h * .55)), interpolation=cv2.INTER_AREA)[:h - int(line)]
-    image = np.concatenate([back[:int(line)], cv2.resize(flat, (w, h - int(line)))]).astype(np.float32)
-    band = slice(max(int(line) - 6, 0), int(line) + 6)
-    image[band] = cv2.GaussianBlur(image, (0, 0), 3)[band]
-    for _ in range(160):  # tufts along the line and on the ground
-        x, y, l = rng.uniform(0, w), line + abs(rng.normal(0, .12)) * h, rng.uniform(4, 16) * w / 640
-        end = x + rng.normal(0, .4) * l, y - l
-        cv2.line(image, (int(x * 8), int(y * 8)), (int(end[0] * 8), int(end[1] * 8)), (np.array([50, 115, 90]) * rng.uniform(.5, 1.2)).tolist(), 1, cv2.LINE_AA, 3)
-    return image
 
 
 def pecking(film):
@@ -980,7 +393,8 @@ def pecking(film):
     image, L, f = yard(rng, h, w, h * rng.uniform(.35, .55)), w * rng.uniform(.17, .24), rng.choice([-1, 1])
     L = min(L, .33 * h)
     x0, y0 = w * (.5 - .12 * f) + rng.normal(0, .04) * w, h * rng.uniform(.58, .66)
-    color = np.array([[95, 90, 90], [55, 90, 140], [190, 200, 205], [60, 60, 65], [50, 75, 100]][film.seed * 2 % 5]) * rng.uniform(.85, 1.15)
+    colors = [95, 90, 90], [55, 90, 140], [190, 200, 205], [60, 60, 65], [50, 75, 100]
+    color = np.array(colors[film.seed * 2 % 5]) * rng.uniform(.85, 1.15)
     plume = skin(rng, color, belly=mix(color, [170, 180, 190], rng.uniform(0, .6)), grain=.07, spots=rng.choice([0, .25]), shine=.1, cell=8)
     wing = skin(rng, color * rng.uniform(.5, .85), bands=rng.choice([4, 9]), grain=.09, shine=.1, cell=9)
     red, tex = np.array([50, 60, 190]), skin(rng, color * rng.uniform(.75, 1.1), grain=.06, shine=.15, cell=10)
@@ -1017,9 +431,10 @@ def pecking(film):
             layer.tube([head + L * np.array([.05 * f * c, -.085]), head + L * np.array([-.05 * f * c, -.1])], L * .03, red)
         layer.dot(*head, L * .095, tex.mean((0, 1)) * 1.02, soft=1.5)
         layer.dot(*(head + L * (.025 * beak + np.array([0, -.02]))), L * .017, [15, 15, 15])
-        layer.tube([at(.26 - .62 * q, .1 - .1 * q) for q in np.linspace(0, 1, 9)], L * np.interp(np.linspace(0, 1, 9), [0, .3, .7, 1], [.07, .14, .1, .02]), wing, soft=1.4)
+        q = np.linspace(0, 1, 9)
+        layer.tube([at(.26 - .62 * v, .1 - .1 * v) for v in q], L * np.interp(q, [0, .3, .7, 1], [.07, .14, .1, .02]), wing, soft=1.4)
         shade = film.layer(); shade.tube([at(.45, -.53), at(-.7, -.53)], L * .05, [0] * 3)
-        film.add(layer.over(darken(image.copy(), shade.a, .5, 5 * s)), layer, head - at(-.82, .07))
+        yield film.frame(layer.over(darken(image.copy(), shade.a, .5, 5 * s)), layer, head - at(-.82, .07))
 
 
 def tail_wagger(film):
@@ -1028,9 +443,12 @@ def tail_wagger(film):
     image = ground(rng, h, w, *((weave, wood) if dog else (gravel, sand, soil)))
     if dog:  # a rug
         rug, edge = weave(rng, h, w), film.layer()
-        edge.poly([[w * .1, h * .12], [w * .88, h * .09], [w * .9, h * .9], [w * .12, h * .92]], [1, 1, 1]); image = mix(image, rug, edge.a[..., None])
-    color = np.array([[45, 60, 80], [75, 115, 160], [40, 42, 45], [165, 185, 200]][rng.integers(4)] if dog else [60, 105, 100]) * rng.uniform(.8, 1.2)
-    fur = skin(rng, color, patch=color * rng.uniform(.6, 1.35), grain=.1, shine=.06 if dog else .2, cell=9 if dog else 14, spots=0 if dog else .4, bands=0 if dog else 6)
+        edge.poly([[w * .1, h * .12], [w * .88, h * .09], [w * .9, h * .9], [w * .12, h * .92]], [1, 1, 1])
+        image = mix(image, rug, edge.a[..., None])
+    coats = [45, 60, 80], [75, 115, 160], [40, 42, 45], [165, 185, 200]
+    color = np.array(coats[rng.integers(4)] if dog else [60, 105, 100]) * rng.uniform(.8, 1.2)
+    look = {"shine": .06, "cell": 9} if dog else {"shine": .2, "cell": 14, "spots": .4, "bands": 6}
+    fur = skin(rng, color, patch=color * rng.uniform(.6, 1.35), grain=.1, **look)
     a0 = rng.uniform(0, TAU); d = np.array([np.cos(a0), np.sin(a0)])
     L = min(w * rng.uniform(.26, .34), .84 * min(w / abs(d[0]), h / abs(d[1])) / (1.9 if dog else 2.4))
     x0, y0 = np.array([w, h]) / 2 + d * L * (.12 if dog else .5) + rng.normal(0, .015, 2) * w
@@ -1047,11 +465,14 @@ def tail_wagger(film):
         tail, d = aside(pts, .96, 0); n = np.array([-d[1], d[0]]); b = np.arctan2(d[1], d[0])
         v = np.linspace(0, 1, 14)
         swing = busy[k] * (.75 * np.sin(phase[k] - 1.2 * v) if dog else .9 * v * np.sin(phase[k] - 3 * v)) + .3 * v
-        layer.tube(spine(*tail, b + swing, L * (.55 if dog else 1.1)), L * np.linspace(.045 if dog else .055, .02 if dog else .006, 15), fur, soft=2 if dog else 1)
+        long, thick = (.55, np.linspace(.045, .02, 15)) if dog else (1.1, np.linspace(.055, .006, 15))
+        layer.tube(spine(*tail, b + swing, L * long), L * thick, fur, soft=2 if dog else 1)
         for q, side, ahead, long in stays:
             root, dd = aside(pts, q, side * half[int(q * 21)] * .7); nn = side * np.array([-dd[1], dd[0]])
-            knee = root + L * long * (.16 * nn + .1 * ahead * dd) * (1 if dog else .8); foot = knee + L * long * (.04 * nn + .17 * (1 if q < .5 else .6) * dd) * (1 if dog else .6)
-            layer.tube([root, knee, foot], L * np.array([.085, .06, .055] if dog else [.03, .024, .018]), color * .85, soft=1.8 if dog else 1)
+            knee = root + L * long * (.16 * nn + .1 * ahead * dd) * (1 if dog else .8)
+            foot = knee + L * long * (.04 * nn + .17 * (1 if q < .5 else .6) * dd) * (1 if dog else .6)
+            thick = L * np.array([.085, .06, .055] if dog else [.03, .024, .018])
+            layer.tube([root, knee, foot], thick, color * .85, soft=1.8 if dog else 1)
         layer.tube(pts, half, fur, soft=2 if dog else 1)
         top = aside(pts, .02, 0)[0]; ha = a0 + curve * -.5 + looks[k]
         ahead = np.array([np.cos(ha), np.sin(ha)]); cross = np.array([-ahead[1], ahead[0]])
@@ -1060,12 +481,12 @@ def tail_wagger(film):
         layer.tube(skull, hl * np.array([.34, .46, .42, .25, .17] if dog else [.3, .42, .42, .3, .15]), fur, soft=1.6)
         if dog:
             for side in (-1, 1):
-                layer.tube([top + ahead * hl * .25 + cross * side * hl * .34, top + ahead * hl * .1 + cross * side * hl * .62], hl * np.array([.15, .17]), color * .6, soft=1.8)
+                ear = [top + hl * (a * ahead + side * out * cross) for a, out in ((.25, .34), (.1, .62))]
+                layer.tube(ear, hl * np.array([.15, .17]), color * .6, soft=1.8)
             layer.dot(*skull[-1], hl * .08, [15, 15, 18])
         for side in (-1, 1):
             layer.dot(*(top + ahead * hl * .6 + cross * side * hl * (.2 if dog else .33)), hl * .045, [12, 12, 12])
-        shade = cv2.warpAffine(layer.cov, np.float32([[1, 0, 4 * s], [0, 1, 6 * s]]), (w, h))
-        film.add(layer.over(darken(image.copy(), shade, .4, 4 * s)), layer, skull[-1] - tail)
+        yield film.frame(film.lit(image, layer, 4, 6, .4, 4), layer, skull[-1] - tail)
 
 
 def hand_feeds(film):
@@ -1077,7 +498,7 @@ def hand_feeds(film):
     crumb = np.array([60, 110, 150]) * rng.uniform(.6, 1.3)
     for k, (frame, layer, ahead) in enumerate(everyday(film, "mouse", "top_fish")):
         if layer.cov.sum() > 1:
-            x = float(layer.cov.sum(0) @ np.arange(w) / layer.cov.sum()); y = float(layer.cov.sum(1) @ np.arange(h) / layer.cov.sum())
+            x, y = center_of(layer.cov)
         heap = film.layer()
         for gx, gy, r, t, g in grains:
             if k >= t:
@@ -1095,26 +516,30 @@ def hand_feeds(film):
             reach = step(1 - abs(t), 0, .75); d = np.array([np.cos(a), np.sin(a)]); n = np.array([-d[1], d[0]])
             tip = aim - d * (1 - reach) * 1.15 * w + n * 6 * s * np.sin(k / 4)
             if k == t0 - 14:
-                grains += [(*(tip + rng.normal(0, .5, 2) * size), rng.uniform(1.2, 2.4) * s, k + int(rng.integers(4, 12)), rng.uniform(.7, 1.2)) for _ in range(12)]
+                grains += [(*(tip + rng.normal(0, .5, 2) * size), rng.uniform(1.2, 2.4) * s, k + int(rng.integers(4, 12)),
+                            rng.uniform(.7, 1.2)) for _ in range(12)]
             hand, wrist = film.layer(), tip - d * size * 1.25
             hand.tube([wrist - d * (w + size), wrist], size * np.array([.48, .3]), flesh, soft=1.5)
-            hand.tube([wrist - d * size * .1, wrist + d * size * .3, wrist + d * size * .62], size * np.array([.3, .42, .4]), flesh, soft=1.5)
+            palm = [wrist + d * size * q for q in (-.1, .3, .62)]
+            hand.tube(palm, size * np.array([.3, .42, .4]), flesh, soft=1.5)
             for j, (o, long, inward) in enumerate(((-.3, .8, -.06), (-.1, .95, .0), (.11, .92, .04), (.3, .72, .1))):
                 root = wrist + d * size * .55 + n * size * o
                 mid = root + size * long * (.4 * d + .1 * inward * n); end = root + size * long * (.75 * d + inward * n * .8)
                 hand.tube([root, mid, end], size * np.array([.125, .115, .09]), flesh, soft=1.3)
                 hand.dot(*(end - d * size * .01), size * .05, tone * 1.13, .5, soft=2)
-            hand.tube([wrist + d * size * .2 - n * size * .35, wrist + d * size * .55 - n * size * .55, wrist + d * size * .9 - n * size * .38], size * np.array([.15, .13, .1]), flesh, soft=1.3)
+            thumb = [wrist + size * (q * d - out * n) for q, out in ((.2, .35), (.55, .55), (.9, .38))]
+            hand.tube(thumb, size * np.array([.15, .13, .1]), flesh, soft=1.3)
             shade = cv2.warpAffine(hand.a, np.float32([[1, 0, 12 * s], [0, 1, 16 * s]]), (w, h)) * (1 - hand.a)
             frame = hand.over(darken(frame, shade, .35, 9 * s)); hide = hand.a
-        film.add(frame, layer, ahead, hide)
+        yield film.frame(frame, layer, ahead, hide)
 
 
 def bubbles(film):
     rng, h, w, s = film.rng, film.h, film.w, film.s
     x0, wide, n = w * rng.uniform(.2, .8), rng.uniform(.025, .06) * w, int(rng.integers(60, 110))
     phase, speed = rng.uniform(0, 1, n), rng.uniform(.006, .013, n)
-    size, off, wob, before = (1.6 + 4.5 * rng.uniform(0, 1, n) ** 2) * s, rng.normal(0, .6, n), rng.uniform(0, TAU, n), rng.uniform(0, 1, n) < .4
+    size, off = (1.6 + 4.5 * rng.uniform(0, 1, n) ** 2) * s, rng.normal(0, .6, n)
+    wob, before = rng.uniform(0, TAU, n), rng.uniform(0, 1, n) < .4
     for k, (frame, layer, ahead) in enumerate(everyday(film, "side_fish")):
         near, far = film.layer(), film.layer()
         for i in range(n):
@@ -1122,9 +547,10 @@ def bubbles(film):
             bx = x0 + wide * off[i] * (.3 + q) + 2.5 * s * np.sin(k / 4 + wob[i] + 9 * q)
             by, r = h * (.93 - .9 * q), size[i] * (.7 + .5 * q)
             to = near if before[i] else far
-            to.dot(bx, by, r, [225, 224, 218], .75); to.dot(bx + r * .1, by + r * .1, r * .62, [105, 102, 92], .6); to.dot(bx - r * .35, by - r * .35, r * .3, [250] * 3, .9)
+            for aside_r, size_r, color, opacity in ((0, 1, [225, 224, 218], .75), (.1, .62, [105, 102, 92], .6), (-.35, .3, [250] * 3, .9)):
+                to.dot(bx + r * aside_r, by + r * aside_r, r * size_r, color, opacity)
         layer.over(far.over(frame)); near.over(frame)
-        film.add(frame, layer, ahead, near.a)
+        yield film.frame(frame, layer, ahead, near.a)
 
 
 def clock(film):
@@ -1149,7 +575,7 @@ def clock(film):
             if k // 15 % 2 == 0:
                 cv2.circle(image, (int(cx + wide + 2 * dot), int(cy - high / 2)), int(dot), (40, 40, 225), -1, cv2.LINE_AA)
             return image
-        film.add(layer.over(frame), layer, ahead, after=print_on)
+        yield film.frame(layer.over(frame), layer, ahead, after=print_on)
 
 
 def camouflage(film):
@@ -1166,8 +592,7 @@ def camouflage(film):
     x, y, a, way = roam(film, 3.2, .2 * w, .1)
     for k in range(film.n):
         layer = film.layer(); pts = body(layer, x[k], y[k], lag(a, k, np.linspace(0, 9, 30)), way[k] * (1 if mouse else 7 / length), .8)
-        shade = cv2.warpAffine(layer.cov, np.float32([[1, 0, 1.5 * s], [0, 1, 2.5 * s]]), (w, h))
-        film.add(layer.over(darken(image.copy(), shade, .15, 3 * s)), layer, pts[0] - pts[18])
+        yield film.frame(film.lit(image, layer, 1.5, 2.5, .15, 3), layer, pts[0] - pts[18])
 
 
 def glossy_beetle(film):
@@ -1185,10 +610,10 @@ def glossy_beetle(film):
         shine, back = film.layer(), np.array([x[k], y[k]]) - d * length * .15
         shine.tube([back + length * (.085 * to + v * .05 * cross) for v in (-1, 1)], length * .035, [250, 250, 248], soft=length * .03)
         shine.dot(*(np.array([x[k], y[k]]) + d * length * .24 + length * .06 * to), length * .03, [240] * 3, .9, soft=length * .025)
-        shine.tube([back + length * (-.12 * to + v * .09 * cross) for v in (-1, 0, 1)], length * .02, [120, 110, 100], .45, soft=length * .04)
+        dull = [back + length * (-.12 * to + v * .09 * cross) for v in (-1, 0, 1)]
+        shine.tube(dull, length * .02, [120, 110, 100], .45, soft=length * .04)
         shine.a *= layer.cov; shine.rgb *= layer.cov[..., None]
-        shade = cv2.warpAffine(layer.cov, np.float32([[1, 0, -5 * s * to[0]], [0, 1, -5 * s * to[1]]]), (w, h))
-        film.add(shine.over(layer.over(darken(image.copy(), shade, .4, 2.5 * s))), layer, d)
+        yield film.frame(shine.over(film.lit(image, layer, -5 * to[0], -5 * to[1], .4, 2.5)), layer, d)
 
 
 def day_night(film):
@@ -1198,7 +623,7 @@ def day_night(film):
     night = np.where(t < mid, step(t, .05, mid), 1 - step(t, mid, .97))
     tint = np.array([[1.25, .98, .82], [.75, .97, 1.2]][int(rng.integers(2))])
     for k, (frame, layer, ahead) in enumerate(everyday(film, "mouse", "side_fish", "top_fish")):
-        film.add(layer.over(frame) * (1.08 * ((1 - night[k]) + night[k] * low * tint)).astype(np.float32), layer, ahead)
+        yield film.frame(layer.over(frame) * (1.08 * ((1 - night[k]) + night[k] * low * tint)).astype(np.float32), layer, ahead)
 
 
 def translucent(film):
@@ -1206,48 +631,18 @@ def translucent(film):
     image = tank(rng, h, w) if film.seed % 2 else gravel(rng, h, w)
     clear, L = rng.uniform(.3, .5), w * rng.uniform(.17, .24)
     L = min(L, .32 * h)
-    jelly = film.seed % 3 == 2
+    is_jelly = film.seed % 3 == 2
     tone = np.array([205, 205, 200]) * rng.uniform(.8, 1.1) + rng.normal(0, 8, 3)
-    x, y, face, pitch, way = glide(film, 1.3 if jelly else 2.3, (.7 * L, .75 * L, w - .7 * L, h - .75 * L))
+    x, y, face, pitch, way = glide(film, 1.3 if is_jelly else 2.3, (.7 * L, .75 * L, w - .7 * L, h - .75 * L))
     lean, pulse = smooth(np.gradient(x), 10) * .35 / s, np.cumsum(.16 * (1 + .15 * drift(rng, film.n, 20)))
-    shell = skin(rng, tone, bands=9, grain=.1, shine=.3, rough=.25)
+    shrimp = shrimp_of(film, L, tone, clear)
     for k in range(film.n):
         layer = film.layer()
-        if jelly:
-            p, up = np.sin(pulse[k]), np.array([np.sin(lean[k]), -np.cos(lean[k])]); n = np.array([-up[1], up[0]])
-            wide, c = L * (.36 + .06 * p), np.array([x[k], y[k]])
-            for i in range(9):
-                o = (i - 4) / 4; t = np.linspace(0, 1, 12)
-                line = c + wide * o * n * .9 - up * (.02 * L + t[:, None] * L * (.75 - .15 * abs(o))) + n * (L * .06 * t * np.sin(7 * t - pulse[k] + i))[:, None]
-                layer.tube(line, L * np.linspace(.008, .004, 12), tone, clear)
-            dome = [c + wide * np.cos(q) * n + L * (.42 - .06 * p) * np.sin(q) * up * (1 if np.sin(q) > 0 else .25) for q in np.linspace(0, TAU, 40)]
-            layer.poly(dome, tone, clear * .8)
-            rim = [c + wide * q * n - L * .07 * up * np.sqrt(max(1 - q * q, 0)) for q in np.linspace(-1, 1, 15)]
-            layer.tube(rim, L * .016, tone * 1.1, clear)
-            for q in (-.5, -.17, .17, .5):
-                layer.dot(*(c + wide * q * n + L * .14 * up), L * .045, [110, 90, 120], .55, soft=2)
-            layer.tube([c + L * .1 * up, c - L * .3 * up], L * np.array([.05, .02]), tone * .8, clear)
-            film.add(layer.over(image.copy()), layer, up)
-            continue
-        f = np.copysign(max(abs(face[k]), .25), face[k]); u = np.linspace(0, 1, 22)
-        a = pitch[k] * .6 + 1.0 * step(u, .35, 1) - .12
-        line = np.stack([np.cos(a), -np.sin(a)], 1).cumsum(0) * L / 22
-        line = np.array([x[k], y[k]]) + (line.mean(0) - line) * [f, 1]
-        for i in range(5):  # swimming legs
-            root = line[9 + i * 2] + np.array([0, L * .04]); q = .5 * np.sin(way[k] * .25 / s + i)
-            layer.tube([root, root + L * np.array([f * (.03 * q - .02), .09])], L * .012, tone, clear)
-        for i in range(4):
-            root = line[3 + i] + np.array([0, L * .05])
-            layer.tube([root, root + L * np.array([f * (.05 - .03 * i), .09]), root + L * np.array([f * (.0 - .04 * i), .16])], L * .007, tone, clear)
-        for q in (.5, .25, -.1):
-            t = np.linspace(0, 1, 10)
-            feel = line[0] + L * np.stack([f * (.65 * t - .25 * t * t * (1 + q)), -.5 * q * t + .3 * t * t * (.6 - q)], 1)
-            layer.tube(feel, L * .004, tone, clear, own=False)
-        layer.poly([line[-2], line[-1] + L * np.array([-f * .1, -.02]), line[-1] + L * np.array([-f * .12, .06]), line[-1] + L * np.array([-f * .02, .12])], tone, clear)
-        layer.tube(line, L * np.interp(u, [0, .05, .2, .4, .7, 1], [.02, .055, .095, .085, .055, .025]), shell, clear, flip=-1 if f > 0 else 1)
-        layer.tube(line[4:12] - [0, L * .02], L * np.interp(np.linspace(0, 1, 8), [0, .4, 1], [.03, .035, .008]), [40, 60, 70], .65, soft=2)
-        layer.dot(*(line[1] + [0, -L * .035]), L * .025, [12, 12, 14])
-        film.add(layer.over(image.copy()), layer, (line[0] - line[14]) * (abs(face[k]) > .3))
+        if is_jelly:
+            ahead = draw_jelly(layer, x[k], y[k], lean[k], pulse[k], L, tone, clear)
+        else:
+            ahead = shrimp(layer, x[k], y[k], face[k], pitch[k], way[k] * .25 / s)
+        yield film.frame(layer.over(image.copy()), layer, ahead)
 
 
 def group_of_two_sizes(film):
@@ -1268,8 +663,7 @@ def group_of_two_sizes(film):
         for i in [i for i in range(1, 6) if not above[i]] + [0] + [i for i in range(1, 6) if above[i]]:
             layers[i].over(frame)
             hide = np.maximum(hide, layers[i].a) if i and above[i] else hide
-        others = [[round(float(l.cov.sum(j) @ np.arange(m) / max(l.cov.sum(), 1)), 2) for j, m in ((0, w), (1, h))] for l in layers[1:]]
-        film.add(frame, layers[0], ahead, hide, others=others)
+        yield film.frame(frame, layers[0], ahead, hide, others=[center_of(layer.cov) for layer in layers[1:]])
 
 
 def wheel(film):
@@ -1279,7 +673,8 @@ def wheel(film):
     for bx in range(int(rng.uniform(0, 30)), w, int(rng.uniform(26, 44) * s)):  # the bars of the cage
         cv2.line(image, (bx, 0), (bx, floor), (135, 138, 140), max(int(2 * s), 1), cv2.LINE_AA)
     R, cx = h * rng.uniform(.34, .39), w * rng.uniform(.4, .6); cy = floor - R - 6 * s
-    f, color = rng.choice([-1, 1]), np.array([[150, 110, 60], [70, 150, 185], [120, 125, 130], [90, 80, 180], [95, 150, 90]][(film.seed + int(rng.integers(2))) % 5]) * rng.uniform(.85, 1.1)
+    f, colors = rng.choice([-1, 1]), ([150, 110, 60], [70, 150, 185], [120, 125, 130], [90, 80, 180], [95, 150, 90])
+    color = np.array(colors[(film.seed + int(rng.integers(2))) % 5]) * rng.uniform(.85, 1.1)
     disc, spokes = film.layer(), int(rng.integers(5, 10))
     disc.dot(cx, cy, R, color * .8)
     disc.rgb *= (1 + .1 * fractal(rng, h, w, 40, 5))[..., None] * (1 - .3 * step(fractal(rng, h, w, 18, 2), 1.0, 1.2))[..., None]
@@ -1294,31 +689,24 @@ def wheel(film):
     ring.tube(np.stack([cx + R * np.cos(t), cy + R * np.sin(t)], 1), 4 * s, np.clip(color * 1.15, 0, 245))
     for i in range(36):  # rungs
         a = TAU * i / 36; ring.tube([[cx + R * q * np.cos(a), cy + R * q * np.sin(a)] for q in (.955, 1.015)], 1.6 * s, color * .45)
-    stand = film.layer(); stand.tube([[cx, cy], [cx - .5 * R, floor + 14 * s]], 4 * s, [70, 72, 75]); stand.tube([[cx, cy], [cx + .5 * R, floor + 14 * s]], 4 * s, [70, 72, 75])
+    stand = film.layer()
+    for side in (-.5, .5):
+        stand.tube([[cx, cy], [cx + side * R, floor + 14 * s]], 4 * s, [70, 72, 75])
     stand.over(image)
     L = R * rng.uniform(.7, .85)
     coat = np.array([[70, 120, 175], [190, 200, 205], [85, 95, 105]][rng.integers(3)]) * rng.uniform(.85, 1.1)
-    fur = skin(rng, coat, belly=mix(coat, [215, 220, 225], .7), patch=coat * 1.12, grain=.08, shine=.05, cell=9)
-    fast = np.clip(.11 * (1 + .35 * drift(rng, film.n, 30)), .03, .2); turned = -f * np.cumsum(fast)
-    sway = drift(rng, film.n, 25)
+    mouse = runner(film, L, coat, f)
+    fast = np.clip(.11 * (1 + .35 * drift(rng, film.n, 30)), .03, .2)
+    turned_rad, sway = -f * np.cumsum(fast), drift(rng, film.n, 25)
     for k in range(film.n):
-        frame = image.copy(); c, sn = np.cos(turned[k]), np.sin(turned[k])
+        frame, layer, c, sn = image.copy(), film.layer(), np.cos(turned_rad[k]), np.sin(turned_rad[k])
         m = [[c, -sn, cx - c * cx + sn * cy], [sn, c, cy - sn * cx - c * cy]]
         disc.warp(m).over(frame)
-        phase, layer = np.cumsum(fast)[k] * R / L * 5, film.layer()
-        x, y, lean = cx + f * (.08 + .03 * sway[k]) * R, cy + R * .93 - L * .36 + 1.5 * s * np.sin(2 * phase), .12 + .04 * sway[k]
-        at = lambda u, v: np.array([x + f * L * (u * np.cos(lean) - v * np.sin(lean)), y - L * (u * np.sin(lean) + v * np.cos(lean))])
-        for hip, o, g in ((-.3, 0, .7), (.25, np.pi, .7), (-.26, np.pi, 1), (.29, 0, 1)):
-            q = np.sin(phase + o); lift = max(np.cos(phase + o), 0)
-            foot = at(hip + .17 * q + .03, -.33 + .08 * lift + .06 * abs(hip + .17 * q))
-            layer.tube([at(hip, -.12), at(hip + .08 * q - .04, -.22), foot], L * np.array([.09, .05, .03]), coat * g * .9, soft=1.5)
-            layer.tube([foot, foot + f * L * np.array([.06, 0])], L * .025, [150, 160, 205] * np.array(g))
-        u = np.linspace(0, 1, 18)
-        layer.tube([at(.5 - q, .07 * np.sin(np.pi * q) - .02) for q in u], L * np.interp(u, [0, .1, .25, .5, .8, 1], [.06, .13, .17, .22, .2, .07]), fur, flip=-1 if f > 0 else 1, soft=1.9)
-        layer.dot(*at(.27, .19), L * .06, mix(coat, [140, 140, 190], .5), soft=1.5); layer.dot(*at(.27, .19), L * .033, [110, 110, 150], soft=1.5)
-        layer.dot(*at(.4, .07), L * .027, [8, 8, 8]); layer.dot(*at(.405, .08), L * .008, [230] * 3); layer.dot(*at(.545, -.03), L * .02, [120, 120, 180])
+        phase = np.cumsum(fast)[k] * R / L * 5
+        y = cy + R * .93 - L * .36 + 1.5 * s * np.sin(2 * phase)
+        ahead = mouse(layer, cx + f * (.08 + .03 * sway[k]) * R, y, .12 + .04 * sway[k], phase)
         rim = ring.warp(m)
-        film.add(rim.over(layer.over(frame)), layer, at(.5, 0) - at(-.5, 0), rim.a)
+        yield film.frame(rim.over(layer.over(frame)), layer, ahead, rim.a)
 
 
 def long_snake(film):
@@ -1348,33 +736,13 @@ def long_snake(film):
             layer.dot(*aside(pts, .018, side * half[2] * .7)[0], max(.8, w * .0018), [12, 12, 12])
         if k % 50 < 8:
             tip, d = aside(pts, 0, 0); layer.tube([tip, tip + d * .022 * w], .7 * s, [40, 40, 120])
-        shade = cv2.warpAffine(layer.cov, np.float32([[1, 0, 2 * s], [0, 1, 3 * s]]), (w, h))
         seen = pts[(pts[:, 0] > 0) & (pts[:, 0] < w - 1)]
-        film.add(layer.over(darken(image.copy(), shade, .4, 2 * s)), layer, seen[0] - seen[-1] if len(seen) > 1 else (0, 0))
+        yield film.frame(film.lit(image, layer, 2, 3, .4, 2), layer, seen[0] - seen[-1] if len(seen) > 1 else (0, 0))
 
 
-KINDS = {f.__name__: f for f in (station, slow_crawler, head_fixed, resting_mirror, side_mirror, cast_shadow, lamp_shadow, two_tone, stop_and_go, ripple,
-                                 shoal, pecking, tail_wagger, plants, hand_feeds, bubbles, clock, camouflage, glossy_beetle, day_night, translucent,
-                                 group_of_two_sizes, wheel, long_snake)}
-FLAGS = {"shoal": ["--follow", "largest"]}
-
-
-def films(folder, seeds=(1, 2, 3), kinds=None):
-    """Makes the missing films. Returns (name, path, path of the truth, flags of analyze, kind) for each."""
-    folder, rows = pathlib.Path(folder), []
-    folder.mkdir(parents=True, exist_ok=True)
-    for kind in kinds or KINDS:
-        for seed in seeds:
-            stem = folder / f"{kind}-{seed}"
-            made = [pathlib.Path(f"{stem}{end}") for end in (".mp4", ".truth.json", ".masks.npz")]
-            if not all(p.exists() for p in made):
-                film = Film(folder, kind, seed)
-                KINDS[kind](film)
-                film.close()
-            rows.append((stem.name, made[0], made[1], FLAGS.get(kind, []), kind))
-    return rows
-
-
-if __name__ == "__main__":
-    for row in films(sys.argv[1], kinds=sys.argv[2:] or None):
-        print(*row[:2], flush=True)
+KINDS = {draw.__name__: draw for draw in (
+    station, slow_crawler, head_fixed, resting_mirror, side_mirror, cast_shadow, lamp_shadow, two_tone, stop_and_go, ripple, shoal, pecking,
+    tail_wagger, plants, hand_feeds, bubbles, clock, camouflage, glossy_beetle, day_night, translucent, group_of_two_sizes, wheel,
+    long_snake)}
+FLAGS = {"shoal": ["--follow-largest"]}
+SEEDS = (1, 2, 3)

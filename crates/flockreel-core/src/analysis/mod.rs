@@ -3,6 +3,7 @@
 //!
 //! [`analyze`] runs all stages. The modules below follow its order.
 
+mod memory;
 pub mod params;
 
 pub mod error;

@@ -7,11 +7,10 @@
 use std::sync::mpsc::{Receiver, Sender, SyncSender, channel, sync_channel};
 use std::thread;
 
+use super::memory::BUDGET_BYTES;
 use crate::footage::{FrameSource, SourceError};
 use crate::raster::Frame;
 
-/// Approximate size of the queue, bytes. It holds at least two batches. Free choice.
-const QUEUE_BYTES: usize = 128 << 20;
 /// Approximate size of a batch, bytes. Free choice.
 const BATCH_BYTES: usize = 4 << 20;
 /// Largest number of frames in a batch. Free choice.
@@ -45,7 +44,7 @@ pub fn while_reading<R>(source: &dyn FrameSource, work: impl FnOnce(Batches) -> 
     let format = source.format();
     let n_bytes = Frame::n_bytes(format.width, format.height).max(1);
     let n_frames = (BATCH_BYTES / n_bytes).clamp(1, MAX_BATCH_FRAMES);
-    let n_waiting = (QUEUE_BYTES / (n_bytes * n_frames)).max(2);
+    let n_waiting = (BUDGET_BYTES / (n_bytes * n_frames)).max(2);
     let (send, ready) = sync_channel(n_waiting);
     let (used, free) = channel();
     thread::scope(|scope| {

@@ -205,6 +205,11 @@ impl Subject {
         self.areas_px[1]
     }
 
+    /// Returns the least area of a moving object, pixels: 0.3 of the subject's, but at least `MIN_AREA_PX`.
+    pub fn least_area_px(&self) -> u64 {
+        ((0.3 * self.area_px()) as u64).max(MIN_AREA_PX)
+    }
+
     /// Returns whether a color fits the subject in a look's light, and better than the look's own color.
     pub fn prefers(&self, color: &Color, look: &Look) -> bool {
         let usual = self.color_in(look.light);

@@ -12,6 +12,7 @@ pub mod direction;
 mod heading;
 pub mod midline;
 pub mod moments;
+pub mod robust;
 mod smooth;
 pub mod sprite;
 #[cfg(test)]

@@ -7,7 +7,7 @@ use super::background::{Background, Threshold};
 use super::fill;
 use super::occupancy::Occupancy;
 use super::resting;
-use super::samples::Samples;
+use super::samples::{MIN_AGREEING, Samples};
 use super::states::thumbnail::Thumbnail;
 use super::states::{self, SampleGroup};
 use super::still_part::StillPart;
@@ -19,8 +19,6 @@ use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
 use crate::raster::{Frame, RgbImage};
 
-/// Least number of free samples that repaint a group's pixel; a median of three ignores one outlier.
-const MIN_FREE_SAMPLES: u32 = 3;
 /// Random seed of the texture synthesis.
 const FILL_SEED: u64 = 1;
 /// Median share of the picture that differs, from which higher thresholds are tried. Free choice.
@@ -355,7 +353,7 @@ fn repainted(
     }
     let of_state =
         samples.commonest_where_free(group.state_samples, &background.frame, occupancy, 1);
-    samples.commonest_where_free(group.samples, &of_state, occupancy, MIN_FREE_SAMPLES)
+    samples.commonest_where_free(group.samples, &of_state, occupancy, MIN_AGREEING as u32)
 }
 
 /// Returns one group with all samples.

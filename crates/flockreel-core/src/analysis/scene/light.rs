@@ -8,19 +8,13 @@
 //! animal has no effect.
 
 use super::background::Background;
-use super::probes::{DARKEST, N_PROBES, RATIO_STEPS};
+use super::probes::{DARKEST, MAX_GAIN, N_PROBES, RATIO_STEPS};
 use crate::order;
 use crate::raster::Frame;
 
-/// Length of the histogram of ratios, which covers ratios from 0 to 4.
-const N_RATIOS: usize = 4 * RATIO_STEPS;
 /// Least number of bright pixels for a gain, 5 % of the pixels compared. With fewer, the animal may cover
 /// most of them. Free choice.
 const MIN_PROBES: u32 = N_PROBES as u32 / 20;
-/// Least gain accepted as light. Free choice.
-const MIN_GAIN: f32 = 0.2;
-/// Upper limit of gains accepted as light, exclusive. Free choice below 4, where the histogram ends.
-const MAX_GAIN: f32 = 3.9;
 /// Number of pixels compared in a row or column, at most. Free choice.
 const MAX_PER_LINE: usize = 160;
 /// Least number of bright pixels for the factor of a row or column. Free choice.
@@ -155,13 +149,14 @@ fn luma_of(rgb: [f32; 3]) -> f32 {
 fn gain(frame: &Frame, background: &Background) -> [f32; 3] {
     let convert = frame.color.to_rgb();
     let (luma, (u, v)) = (frame.luma(), frame.chroma());
-    let mut counts = [[0u16; N_RATIOS]; 3];
+    // The last bin has all greater ratios.
+    let mut counts = [[0u16; MAX_GAIN * RATIO_STEPS + 1]; 3];
     for probe in &background.probes {
         let chroma = probe.chroma_idx as usize;
         let rgb = convert.convert(luma[probe.luma_idx as usize], u[chroma], v[chroma]);
         for channel in 0..3 {
             let ratio = probe.ratio(channel, rgb[channel]);
-            counts[channel][ratio.min(N_RATIOS - 1)] += 1;
+            counts[channel][ratio.min(MAX_GAIN * RATIO_STEPS)] += 1;
         }
     }
     let n_dark = |channel: usize| {
@@ -184,16 +179,15 @@ fn gain(frame: &Frame, background: &Background) -> [f32; 3] {
 
 /// Returns the median of the counted ratios. Returns `None` when too few pixels are bright enough or when the
 /// median is no gain that light can cause.
-fn median_gain(counts: &[u16; N_RATIOS]) -> Option<f32> {
+fn median_gain(counts: &[u16]) -> Option<f32> {
     let n: u32 = counts.iter().map(|&count| u32::from(count)).sum();
     let mut below = 0;
     let middle = counts.iter().position(|&count| {
         below += u32::from(count);
         2 * below >= n
     })?;
-    let gain = middle as f32 / RATIO_STEPS as f32;
-    let is_light = n >= MIN_PROBES && (MIN_GAIN..MAX_GAIN).contains(&gain);
-    is_light.then_some(gain)
+    let is_light = middle < MAX_GAIN * RATIO_STEPS && MAX_GAIN * middle > RATIO_STEPS;
+    (n >= MIN_PROBES && is_light).then_some(middle as f32 / RATIO_STEPS as f32)
 }
 
 /// Returns the factors of the rows, and of the columns after division by the rows.

@@ -14,9 +14,9 @@ const MAX_DEVIATION: f64 = 0.15;
 const MIN_AGREEING_SHARE: f64 = 0.8;
 /// Least number of pairs for a decision. Free choice.
 const MIN_PAIRS: usize = 6;
-/// Least range of the animal's motion, as a share of its diagonal. A resting pair agrees with any mirror.
-/// Free choice.
-const MIN_RANGE: f64 = 0.5;
+/// Least range of an object that moves, as a share of the animal's diagonal. A swaying plant moves less, and a
+/// resting pair agrees with any mirror. Free choice.
+pub(super) const MIN_RANGE: f64 = 0.5;
 
 /// A line in the picture, and the side of it on which images lie.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,9 +4,9 @@
 //! ghost is a place at which the background shows the resting animal and the sample does not.
 
 use super::background::Background;
-use super::samples::Samples;
+use super::samples::{MIN_AGREEING, Samples};
 use super::still_part::StillPart;
-use super::survey::{MIN_GHOST_SAMPLES, Survey};
+use super::survey::Survey;
 use super::sway;
 use crate::raster::runs::Component;
 use crate::raster::{Frame, Mask};
@@ -114,7 +114,7 @@ impl Occupancy {
     /// only those count, because in the others the animal covers the pixel.
     pub(super) fn free(&self, px: usize, group: u64) -> u64 {
         let ghost = self.ghost[px] & group;
-        if ghost.count_ones() as usize >= MIN_GHOST_SAMPLES {
+        if ghost.count_ones() as usize >= MIN_AGREEING {
             ghost & !self.taken[px]
         } else {
             group & !self.taken[px]

@@ -10,6 +10,8 @@ pub(super) const N_PROBES: u64 = 4096;
 pub(super) const DARKEST: u32 = 16;
 /// Steps per unit in which ratios of brightness are counted.
 pub(super) const RATIO_STEPS: usize = 1024;
+/// Greatest factor, up or down, that light can cause between two frames of one state. Free choice.
+pub(super) const MAX_GAIN: usize = 4;
 
 /// A pixel whose brightness is compared in every frame.
 pub struct Probe {

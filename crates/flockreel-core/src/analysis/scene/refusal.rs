@@ -4,7 +4,7 @@
 //! The reasons checked here are: nothing moves, the scene moves, the animal is too large, or there are
 //! several animals. Moving cameras and changing light are found earlier, in `states`.
 
-use super::mirror::Mirror;
+use super::mirror::{MIN_RANGE, Mirror};
 use super::samples::Samples;
 use super::survey::Survey;
 use crate::analysis::params::Follow;
@@ -15,22 +15,17 @@ use crate::order;
 
 /// Least share of the samples in which the animal must be found, 0..=1. Free choice.
 const MIN_FOUND_SHARE: f64 = 0.05;
-/// Share of the picture that may differ without being the animal, 0..=1. Free choice.
-const BUSY_AREA: f64 = 0.15;
-/// Share of the samples, 0..=1. The scene moves if more of them exceed `BUSY_AREA`. A second animal must
+/// Share of the samples, 0..=1. The scene moves if in more of them other things than the animal exceed `MAX_AREA_SHARE`. A second animal must
 /// appear in more of them. Free choice.
 const FREQUENT_SHARE: f64 = 0.3;
-/// Largest median area of the animal, as a share of the picture; a larger one hides too much of the
-/// background. The limit also refuses moving bedding that is mistaken for the animal.
+/// Largest median area of the animal, and of all other things together, as a share of the picture; a larger one
+/// hides too much of the background. The limit also refuses moving bedding that is mistaken for the animal.
 ///
 /// Free choice: of the films `large_animal` in `bench/cases.py`, which come near it, one is measured wrongly
 /// (docs/measurements.md).
 const MAX_AREA_SHARE: f64 = 0.15;
 /// Least area of a second animal, as a share of the animal's area. Free choice.
 const MIN_SECOND_AREA: f64 = 0.5;
-/// Least range of a second animal, as a share of the animal's diagonal. A swaying plant moves less. Free
-/// choice.
-const MIN_RANGE: f64 = 0.5;
 
 /// Moving objects besides the animal that look like it.
 pub(super) enum SimilarObjects {
@@ -74,7 +69,7 @@ fn check_scene(survey: &Survey, samples: &Samples, subject: &Subject) -> Result<
     let other_area_px =
         |k: usize| survey.looks[k].iter().map(|l| l.area_px).sum::<f64>() - animal_area_px(k);
     let busy: Vec<usize> = (0..survey.looks.len())
-        .filter(|&k| other_area_px(k) > BUSY_AREA * n_px)
+        .filter(|&k| other_area_px(k) > MAX_AREA_SHARE * n_px)
         .collect();
     if busy.len() as f64 > FREQUENT_SHARE * n_samples {
         let looks = survey.looks[busy[0]].iter().enumerate();

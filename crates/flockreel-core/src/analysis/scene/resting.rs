@@ -8,15 +8,11 @@
 use super::background::Background;
 use super::light::Light;
 use super::occupancy::Occupancy;
+use super::pixel_statistics::ranks::SAME_LEVELS;
 use super::states::SampleGroup;
 use crate::analysis::silhouette;
 use crate::analysis::subject::{Color, FITS, Look, Subject};
 use crate::raster::runs::Component;
-
-/// Least area of a component, as a share of the subject's area. Free choice.
-const MIN_AREA_SHARE: f64 = 0.3;
-/// Mean difference below which two backgrounds show the same, levels of 255. Free choice.
-const SAME_LEVELS: f64 = 10.0;
 
 /// Marks the samples and pixels in which the subject rests as taken. `windows` are time windows of the state
 /// that `whole` describes, with their backgrounds.
@@ -29,7 +25,7 @@ pub(super) fn mark_resting(
     for (window, background) in windows {
         let found = silhouette::components(&background.frame, whole, &Light::NEUTRAL, &[]);
         for component in found {
-            if (component.area as f64) < MIN_AREA_SHARE * subject.area_px() {
+            if component.area < subject.least_area_px() {
                 continue;
             }
             let here = cost(subject, background, whole, &component);
@@ -84,5 +80,5 @@ fn is_same(background: &Background, other: &Background, component: &Component) -
         .zip(&mask.bits)
         .filter(|(_, bit)| **bit == 1);
     let sum: u64 = inside.map(|(level, _)| u64::from(*level)).sum();
-    (sum as f64) < SAME_LEVELS * component.area as f64
+    sum < u64::from(SAME_LEVELS) * component.area
 }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::background::Background;
 use super::light;
 use super::states::thumbnail::Thumbnail;
+use crate::analysis::memory::BUDGET_BYTES;
 use crate::analysis::params::AnimalAtParam;
 use crate::analysis::{Error, MIN_FRAMES, Params};
 use crate::footage::{FrameSource, spread_idx};
@@ -20,13 +21,8 @@ use crate::raster::Frame;
 
 /// Largest number of samples: one bit each in a 64-bit word.
 pub(super) const MAX_SAMPLES: usize = 64;
-/// Least number of samples, even where they exceed the memory budget. Free choice.
-const MIN_SAMPLES: usize = 16;
-/// Memory for the samples, bytes. Free choice.
-const MEMORY_BYTES: usize = 128 << 20;
-
-/// Number of frames compared to detect uneven light. Free choice.
-const N_LIGHT_FRAMES: u32 = 16;
+/// Least number of samples that agree on what a place shows. With three, one outlier is outvoted.
+pub(super) const MIN_AGREEING: usize = 3;
 
 /// The samples of a footage.
 pub(super) struct Samples {
@@ -54,7 +50,7 @@ impl Samples {
     ) -> Result<Samples, Error> {
         let format = source.format();
         let n_bytes = Frame::n_bytes(format.width, format.height);
-        let n_kept = (MEMORY_BYTES / n_bytes).clamp(MIN_SAMPLES, MAX_SAMPLES);
+        let n_kept = (BUDGET_BYTES / n_bytes).clamp(MIN_FRAMES, MAX_SAMPLES);
         let mut frames = Vec::with_capacity(n_kept);
         source.spread(n_kept, &mut |frame| {
             frames.push(frame.clone());
@@ -123,7 +119,7 @@ impl Samples {
     /// Divides the samples of `group` by their light relative to a background. Sets `uneven_light` of the
     /// background.
     pub(super) fn equalize_light(&mut self, group: u64, background: &mut Background) {
-        let step = group.count_ones().div_ceil(N_LIGHT_FRAMES).max(1) as usize;
+        let step = group.count_ones().div_ceil(MIN_FRAMES as u32).max(1) as usize;
         let members = indices(group).step_by(step).map(|k| &self.frames[k]);
         let compared: Vec<&Frame> = members.collect();
         background.uneven_light = light::is_uneven(&compared, background);

@@ -5,15 +5,11 @@
 
 use crate::raster::runs::Component;
 
-/// Overlap above which two boxes are at the same place (Jaccard index). Free choice.
-const SAME_PLACE_OVERLAP: f64 = 0.5;
 /// Overlap above which a box has not moved at all (Jaccard index). Free choice.
 const EXACT_OVERLAP: f64 = 0.8;
 
 /// Share of the samples above which a place recurs too often for a passing animal, 0..=1. Free choice.
 const RECURRENCE: f64 = 0.25;
-/// Least share of the recurrences in which the animal must appear elsewhere, 0..=1. Free choice.
-const MIN_ELSEWHERE_SHARE: f64 = 0.5;
 
 /// Returns whether a component is swaying scenery. `samples` holds the components of all samples, and `animal`
 /// the index of the animal among those of each sample.
@@ -32,10 +28,9 @@ pub(super) fn is_scenery(
         }
         n_recurrences += 1;
         let elsewhere = animal.is_some_and(|at| !is_same_place(&components[at], component));
-        n_elsewhere += usize::from(elsewhere);
+        n_elsewhere += u32::from(elsewhere);
     }
-    f64::from(n_recurrences) > RECURRENCE * samples.len() as f64
-        && f64::from(n_elsewhere as u32) >= MIN_ELSEWHERE_SHARE * f64::from(n_recurrences)
+    f64::from(n_recurrences) > RECURRENCE * samples.len() as f64 && 2 * n_elsewhere >= n_recurrences
 }
 
 /// Returns whether at least `least` samples show a component at exactly the same place; its own sample
@@ -55,7 +50,7 @@ pub(super) fn recurs_exactly(
 
 /// Returns whether the boxes of two components share most of their pixels.
 fn is_same_place(a: &Component, b: &Component) -> bool {
-    overlap(a, b) > SAME_PLACE_OVERLAP
+    overlap(a, b) > 0.5
 }
 
 /// Returns the Jaccard index of the boxes of two components, 0..=1.

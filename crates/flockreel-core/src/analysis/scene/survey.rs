@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::background::Background;
 use super::ghost;
 use super::light::Light;
-use super::samples::Samples;
+use super::samples::{MIN_AGREEING, Samples};
 use super::scenery;
 use crate::analysis::silhouette::cast_shadow::{self, Lump};
 use crate::analysis::silhouette::{self, Difference, shadow, tether};
@@ -22,11 +22,6 @@ use crate::raster::{Frame, Mask};
 /// Number of components kept per sample, largest first; further ones are noise. Free choice.
 const MAX_COMPONENTS: usize = 24;
 
-/// Samples that must show a ghost at one place. If it touches the animal, both move as one component.
-pub(super) const MIN_GHOST_SAMPLES: usize = 3;
-
-/// Share of the animal's sightings that must show a tether, 0..=1. Free choice.
-const MIN_TETHERED_SHARE: f64 = 0.5;
 /// A tether ends at a fixed place if the spread of its ends is below this share of the animal's spread. The
 /// background may hide the rest of such a tether. Free choice.
 const MAX_END_SPREAD: f64 = 0.4;
@@ -130,7 +125,7 @@ impl Survey {
                     subject.prefers(&Color::in_component(&background.rgb, component), look)
                 };
                 look.is_ghost = look.is_ghost
-                    && scenery::recurs_exactly(&found, component, MIN_GHOST_SAMPLES)
+                    && scenery::recurs_exactly(&found, component, MIN_AGREEING)
                     && (background.zip(subject.as_ref()))
                         .is_some_and(|(background, subject)| shows_animal(background, subject));
             }
@@ -201,7 +196,7 @@ impl Survey {
         } else {
             n_at_border
         };
-        (n_tethered as f64 > MIN_TETHERED_SHARE * animals.len() as f64).then_some(thin_px)
+        (2 * n_tethered > animals.len()).then_some(thin_px)
     }
 
     /// Returns the subject's score over the root of its area, and so without its size. A threshold that is
@@ -244,8 +239,8 @@ impl Survey {
 
     /// Returns the least area of a moving object, pixels: 0.3 of the subject's, but at least `MIN_AREA_PX`.
     pub(super) fn least_area_px(&self) -> u64 {
-        let share_of = |subject: &Subject| (0.3 * subject.area_px()) as u64;
-        self.subject.as_ref().map_or(0, share_of).max(MIN_AREA_PX)
+        let subject = self.subject.as_ref();
+        subject.map_or(MIN_AREA_PX, Subject::least_area_px)
     }
 }
 

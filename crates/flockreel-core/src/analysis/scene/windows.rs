@@ -17,9 +17,6 @@ const MAX_SPLIT_RATIO: f64 = 0.65;
 /// choice.
 const MIN_SPLIT_SHARE: f64 = 0.33;
 
-/// Target number of samples in a short window. Free choice.
-const SAMPLES_PER_WINDOW: usize = 8;
-
 /// Splits a group in time, recursively, while a split explains the samples much better. `is_free(k, cell)`
 /// tells whether sample `k` shows the scene at a thumbnail cell. Returns the pieces in order of time.
 pub(super) fn split(
@@ -63,7 +60,7 @@ pub(super) fn split(
 /// short that a moving animal rarely enters their median.
 pub(super) fn short_windows(group: SampleGroup) -> Vec<SampleGroup> {
     let members: Vec<usize> = indices(group.samples).collect();
-    let n_windows = (members.len() / SAMPLES_PER_WINDOW).max(1);
+    let n_windows = (members.len() / MIN_SAMPLES as usize).max(1);
     let window = |k: usize| {
         let range = k * members.len() / n_windows..(k + 1) * members.len() / n_windows;
         let samples = members[range].iter().fold(0, |mask, k| mask | 1 << k);

@@ -1,7 +1,7 @@
 //! Order statistics of each pixel over the samples: the median, the commonest value and the noise
 //! (docs/explanation/algorithms.md, "Background" and "Light and noise").
 
-mod ranks;
+pub(super) mod ranks;
 
 use rayon::prelude::*;
 

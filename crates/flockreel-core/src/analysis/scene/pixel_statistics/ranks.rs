@@ -9,7 +9,7 @@ use crate::analysis::scene::samples::MAX_SAMPLES;
 
 /// Largest difference between values of an unchanged scene, levels of 255. It covers noise and residual
 /// flicker. Free choice.
-const SAME_LEVELS: u8 = 10;
+pub(in crate::analysis::scene) const SAME_LEVELS: u8 = 10;
 /// Pixels searched at once.
 const LANES: usize = 64;
 

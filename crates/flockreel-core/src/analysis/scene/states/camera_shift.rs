@@ -27,8 +27,9 @@ const MIN_PEAK: f64 = 0.3;
 const MIN_TILES: usize = 4;
 /// Least share of the tiles that must agree on a shift, 0..=1. Free choice.
 const MIN_AGREEING_SHARE: f64 = 0.6;
-/// Deviation within which a tile agrees, pixels. Free choice.
-const TOLERANCE_PX: f64 = 0.5;
+/// Shift above which the camera has moved, and deviation within which a tile agrees, pixels. Smaller ones are within
+/// the error of the correlation.
+pub(super) const MIN_SHIFT_PX: f64 = 0.6;
 /// Deviation within which a tile agrees, as a share of the shift, if that is larger. Tiles fade to their
 /// edges, so large shifts are measured too small. Free choice.
 const TOLERANCE: f64 = 0.35;
@@ -86,7 +87,7 @@ impl Correlator {
             along[along.len() / 2]
         };
         let shift = [middle(0), middle(1)];
-        let tolerance_px = TOLERANCE_PX.max(TOLERANCE * libm::hypot(shift[0], shift[1]));
+        let tolerance_px = MIN_SHIFT_PX.max(TOLERANCE * libm::hypot(shift[0], shift[1]));
         let agrees = |s: &&[f64; 2]| libm::hypot(s[0] - shift[0], s[1] - shift[1]) <= tolerance_px;
         let agreeing = shifts.iter().filter(agrees).count() as f64;
         (agreeing >= MIN_AGREEING_SHARE * shifts.len() as f64).then_some(shift)

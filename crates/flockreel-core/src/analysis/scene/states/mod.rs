@@ -9,7 +9,7 @@
 mod camera_shift;
 pub(super) mod thumbnail;
 
-use self::camera_shift::Correlator;
+use self::camera_shift::{Correlator, MIN_SHIFT_PX};
 use self::thumbnail::Thumbnail;
 use super::samples::{Samples, indices};
 use crate::analysis::Error;
@@ -17,18 +17,10 @@ use crate::order;
 
 /// Share of differing cells above which two samples show different states, 0..=1. Free choice.
 const STATE_MISMATCH: f64 = 0.35;
-/// Least number of samples for a background. Free choice; a median of five already ignores two outliers.
-pub(super) const MIN_SAMPLES: u32 = 6;
-/// Least number of samples at one of several camera positions; with fewer, the camera only passed. Free
-/// choice.
-const MIN_AT_POSITION: u32 = 8;
+/// Least number of samples for a background. Free choice; with fewer at one position, the camera only passed.
+pub(super) const MIN_SAMPLES: u32 = 8;
 /// Extra camera positions above which the camera counts as never at rest. Free choice.
 const MAX_MOVES: usize = 3;
-/// Least share of the samples that must belong to a state, 0..=1; with fewer, the footage is refused. Free
-/// choice.
-const MIN_GROUPED_SHARE: f64 = 0.5;
-/// Shift above which the camera has moved, pixels. Smaller shifts are within the error of the correlation.
-const MIN_SHIFT_PX: f64 = 0.6;
 /// Samples checked for a shift before all samples are. Free choice.
 const N_SHIFT_CHECKS: usize = 21;
 
@@ -64,15 +56,9 @@ pub(super) fn group_samples(samples: &Samples) -> Result<Vec<SampleGroup>, Error
     let n_samples = samples.frames.len() as u32;
     let (mut kept, mut dropped) = (Vec::new(), Vec::new());
     for (light, of_state) in merge_alike(&thumbnails, segments).into_iter().enumerate() {
-        let positions = camera_positions(samples, of_state);
-        let least = if positions.len() > 1 {
-            MIN_AT_POSITION
-        } else {
-            MIN_SAMPLES
-        };
-        for samples in positions {
+        for samples in camera_positions(samples, of_state) {
             let group = SampleGroup::of_state(samples, light);
-            if samples.count_ones() >= least.min(n_samples.div_ceil(2)) {
+            if samples.count_ones() >= MIN_SAMPLES.min(n_samples.div_ceil(2)) {
                 kept.push(group);
             } else {
                 dropped.push(group);
@@ -80,7 +66,7 @@ pub(super) fn group_samples(samples: &Samples) -> Result<Vec<SampleGroup>, Error
         }
     }
     let n_kept: u32 = kept.iter().map(|group| group.samples.count_ones()).sum();
-    if f64::from(n_kept) < MIN_GROUPED_SHARE * f64::from(n_samples) {
+    if 2 * n_kept < n_samples {
         return Err(refusal(samples, &thumbnails, &dropped));
     }
     kept.sort_by_key(|group| (std::cmp::Reverse(group.samples.count_ones()), group.samples));

@@ -4,6 +4,7 @@
 //! Before a comparison, one thumbnail is fitted to the other by gains for the whole picture, its rows and its
 //! columns.
 
+use crate::analysis::scene::probes::MAX_GAIN;
 use crate::order;
 use crate::raster::Frame;
 
@@ -19,8 +20,6 @@ const CHROMA_LEVELS: f32 = 8.0;
 const MAX_DARK_LUMA: f32 = 12.0;
 /// A picture is blank if its cells' luma varies by less than this, levels of 255. Free choice.
 const MAX_BLANK_RANGE: f32 = 6.0;
-/// Largest gain of light between two thumbnails, as a factor up or down. Free choice.
-const MAX_GAIN: f32 = 4.0;
 
 /// Means of Y (minus black), U and V (both minus 128) in square cells, row by row.
 #[derive(Clone, Debug)]
@@ -159,7 +158,7 @@ impl Thumbnail {
             return;
         }
         let gain = order::percentile(&mut ratios, 0.5).unwrap_or(1.0) as f32;
-        let gain = gain.clamp(1.0 / MAX_GAIN, MAX_GAIN);
+        let gain = gain.clamp(1.0 / MAX_GAIN as f32, MAX_GAIN as f32);
         for k in cells {
             self.cells[k][0] /= gain;
         }

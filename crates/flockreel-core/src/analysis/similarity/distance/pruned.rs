@@ -17,11 +17,9 @@ use super::bounds::SquareSums;
 use super::marks::Marks;
 use super::pair_filter::{self, PairFilter};
 use super::{Cancelled, ClipPair, Distances, Side};
+use crate::analysis::memory::BUDGET_BYTES;
 use crate::progress::Progress;
 
-/// Approximate memory of a panel, bytes. Groups in the temporary storage are read once per panel. Free
-/// choice.
-const PANEL_BYTES: usize = 128 << 20;
 /// Memory per pair of frames, bytes: its bound and its entry in a tile.
 const PAIR_BYTES: usize = size_of::<u32>() + size_of::<u64>();
 /// Largest number of groups in a panel. Tests use 1, so that their short films have several panels.
@@ -40,7 +38,7 @@ impl Distances<'_> {
         mut on_row: impl FnMut(usize, &[ClipPair]),
     ) -> Result<(), Cancelled> {
         let (n_frames, n_clips) = (self.pixels.n_frames(), self.n_clips());
-        let n_groups = PANEL_BYTES / (GROUP * n_frames.max(1) * PAIR_BYTES);
+        let n_groups = BUDGET_BYTES / (GROUP * n_frames.max(1) * PAIR_BYTES);
         let n_rows = GROUP * n_groups.clamp(1, MAX_GROUPS);
         let mut panel = Panel::new(self, limit);
         for first in (0..n_clips).step_by(n_rows) {

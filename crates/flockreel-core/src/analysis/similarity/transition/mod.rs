@@ -11,6 +11,7 @@ mod gate;
 mod tests;
 
 use gate::Gate;
+pub use gate::TURN_GATE_RAD_PER_S;
 
 use crate::analysis::similarity::distance::{
     Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Marks, PairFilter, Side,
