@@ -11,7 +11,7 @@ use super::Axes;
 /// Speed along the axis that counts as evidence 1, body lengths per second. Free choice.
 const UNIT_SPEED_BL_S: f64 = 0.45;
 /// Greatest evidence of one frame from motion, and from the ends, half the log-odds. Free choice.
-const MAX_EVIDENCE: f64 = 4.0;
+const MAX_EVIDENCE: f64 = 3.0;
 /// Evidence where the user gave the head; it exceeds all other evidence.
 pub(super) const GIVEN_HEAD_EVIDENCE: f64 = 1e6;
 

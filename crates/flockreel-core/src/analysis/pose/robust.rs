@@ -12,13 +12,8 @@ pub(super) const MIN_FRAMES: usize = 8;
 
 /// Returns the loss of a residual in standard deviations: its square, but a line beyond `HUBER`.
 pub(super) fn loss(sigmas: f64) -> f64 {
-    loss_beyond(HUBER, sigmas)
-}
-
-/// Returns the loss of a residual in standard deviations: its square, but a line beyond `limit`.
-pub(super) fn loss_beyond(limit: f64, sigmas: f64) -> f64 {
     let sigmas = sigmas.abs();
-    let square = sigmas.min(limit);
+    let square = sigmas.min(HUBER);
     square * (2.0 * sigmas - square)
 }
 

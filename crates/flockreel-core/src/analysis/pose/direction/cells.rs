@@ -20,9 +20,6 @@ const MAX_PITCH_RAD: f64 = PI / 3.0;
 const MOTION_BL: [f64; 3] = [0.25, 0.25, 0.6];
 /// Standard deviation of the pitch, radians. Free choice.
 const PITCH_NOISE: f64 = 0.4;
-/// Residuals grow linearly beyond this many standard deviations. On a generated film with hard light, the 90th
-/// percentile of the error is 21 degrees at 3 and 30 degrees at the 2.5 of `robust`.
-const MAX_SIGMAS: f64 = 3.0;
 
 /// The cells, with the expected measurements for each.
 pub(super) struct Cells {
@@ -81,8 +78,7 @@ impl Cells {
             let speed = (dot(&along, &moved) / dot(&along, &along)).max(0.0);
             let residual: [f64; 3] = std::array::from_fn(|c| moved[c] - speed * along[c]);
             let pitch = self.pitch[k % N_PITCH] / PITCH_NOISE;
-            0.5 * robust::loss_beyond(MAX_SIGMAS, dot(&residual, &residual).sqrt())
-                + 0.5 * pitch * pitch
+            0.5 * robust::loss(dot(&residual, &residual).sqrt()) + 0.5 * pitch * pitch
         };
         self.axes.iter().enumerate().map(cost).collect()
     }
@@ -104,8 +100,7 @@ impl Cells {
                     * (b * residual[0] * residual[1]
                         + c * residual[0] * residual[2]
                         + e * residual[1] * residual[2]);
-            *cost += 0.5 * robust::loss_beyond(MAX_SIGMAS, square.max(0.0).sqrt())
-                + self.half_log_det[k];
+            *cost += 0.5 * robust::loss(square.max(0.0).sqrt()) + self.half_log_det[k];
         }
     }
 
