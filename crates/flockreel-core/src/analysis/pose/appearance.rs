@@ -5,13 +5,31 @@
 //! motion nor a first guess. The direction of motion decides once per film which sign belongs to the head.
 
 use super::Axes;
-use super::heading;
-use super::robust::{MIN_FRAMES, SPAN_S};
 use crate::analysis::track::Tracked;
 use crate::analysis::track::asymmetry::{Asymmetry, N_NUMBERS};
 
+/// Least ratio of the standard deviations along and across the axis. Free choice: round silhouettes have no
+/// ends.
+const MIN_ELONGATION: f64 = 1.25;
+/// Least number of frames to estimate the difference between the ends. Free choice.
+const MIN_FRAMES: usize = 8;
 /// Iterations of the power method. Free choice.
 const N_ITERATIONS: usize = 64;
+/// Greatest evidence of one frame, half the log-odds. Free choice.
+const MAX_HALF_LOG_ODDS: f64 = 4.0;
+/// Least standard deviation of scores, as a share of their mean. Free choice: changing light varies every
+/// film.
+const MIN_SPREAD: f64 = 0.25;
+/// Greatest speed that counts, body lengths per second. Free choice.
+const MAX_SPEED_BL_S: f64 = 1.0;
+/// Length of the spans over which speeds are averaged, seconds. Their scatter gives the certainty. Free
+/// choice.
+const SPAN_S: f64 = 0.5;
+
+/// Least |cosine| of the angle between the length axis and the axis of the moments. Free choice.
+///
+/// At larger angles, the ends of the moments are not those of the length axis.
+const MIN_AXIS_COSINE: f64 = 0.7;
 
 /// Evidence for the head from the appearance of the ends.
 pub(super) struct HeadEvidence {
@@ -48,12 +66,15 @@ impl HeadEvidence {
         let scores = || uncut.iter().map(|a| score(a, &principal));
         let mean = scores().map(f64::abs).sum::<f64>() / n;
         let square = scores().map(|score| score.powi(2)).sum::<f64>() / n;
-        let variance = (square - mean * mean).max(1e-12);
+        let variance = (square - mean * mean)
+            .max((MIN_SPREAD * mean).powi(2))
+            .max(1e-12);
         let half_log_odds_of = |k: usize| {
             let major_rad = track[k].sighting.as_ref()?.moments.major_rad?;
             let same = libm::cos(axes[k].as_ref()?.axis_rad? - major_rad);
-            // Where the axes differ, the ends of the moments are not those of the length axis.
-            Some(same * heading::limited(mean * score(seen[k]?, &principal) / variance))
+            let evidence = (mean * score(seen[k]?, &principal) / variance)
+                .clamp(-MAX_HALF_LOG_ODDS, MAX_HALF_LOG_ODDS);
+            (same.abs() > MIN_AXIS_COSINE).then_some(same.signum() * evidence)
         };
         let mut half_log_odds: Vec<Option<f64>> = (0..track.len()).map(half_log_odds_of).collect();
         let t = t_statistic(&half_log_odds, speed, fps);
@@ -79,8 +100,8 @@ impl HeadEvidence {
 
 fn long_asymmetry(tracked: &Tracked) -> Option<&Asymmetry> {
     let sighting = tracked.sighting.as_ref()?;
-    let asymmetry = sighting.asymmetry.as_ref();
-    asymmetry.filter(|_| sighting.moments.is_long())
+    let is_long = sighting.moments.eigenvalue_ratio >= MIN_ELONGATION * MIN_ELONGATION;
+    sighting.asymmetry.as_ref().filter(|_| is_long)
 }
 
 /// Returns the unit vector with the greatest sum of squared projections of all frames.
@@ -115,7 +136,7 @@ fn score(asymmetry: &Asymmetry, axis: &[f64; N_NUMBERS]) -> f64 {
 
 /// Returns the t-statistic of motion toward the end that the evidence names.
 ///
-/// It is the sum over spans of the product of both kinds of evidence, divided by its standard deviation if both
+/// It is the sum over spans of the mean speed toward that end, divided by its standard deviation if both
 /// directions were equally likely.
 fn t_statistic(evidence: &[Option<f64>], speed_bl_s: &[Option<f64>], fps: f64) -> f64 {
     let span = ((SPAN_S * fps).round() as usize).max(1);
@@ -124,7 +145,8 @@ fn t_statistic(evidence: &[Option<f64>], speed_bl_s: &[Option<f64>], fps: f64) -
         .zip(speed_bl_s.chunks(span))
         .map(|(evidence, speeds)| {
             let along = |(evidence, speed): (&Option<f64>, &Option<f64>)| {
-                Some(evidence.as_ref()? * heading::of_motion(*speed.as_ref()?))
+                let sign = (evidence.as_ref()? / MAX_HALF_LOG_ODDS).clamp(-1.0, 1.0);
+                Some(sign * speed.as_ref()?.clamp(-MAX_SPEED_BL_S, MAX_SPEED_BL_S))
             };
             evidence.iter().zip(speeds).filter_map(along).sum::<f64>() / span as f64
         });

@@ -10,10 +10,10 @@ use super::Axes;
 
 /// Speed along the axis that counts as evidence 1, body lengths per second. Free choice.
 const UNIT_SPEED_BL_S: f64 = 0.45;
-/// Greatest evidence of one frame from motion, and from the ends, half the log-odds. Free choice.
-const MAX_EVIDENCE: f64 = 3.0;
+/// Greatest evidence from motion, half the log-odds. Free choice.
+const MAX_MOTION_EVIDENCE: f64 = 3.0;
 /// Evidence where the user gave the head; it exceeds all other evidence.
-pub(super) const GIVEN_HEAD_EVIDENCE: f64 = 1e6;
+const GIVEN_HEAD_EVIDENCE: f64 = 1e6;
 
 /// The head in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,7 +95,8 @@ fn evidence(
 ) -> Vec<Option<f64>> {
     let evidence_at = |k: usize| {
         axes[k].as_ref()?.axis_rad?;
-        let motion = of_motion(speed_along[k].unwrap_or(0.0));
+        let speed = speed_along[k].unwrap_or(0.0);
+        let motion = (speed / UNIT_SPEED_BL_S).clamp(-MAX_MOTION_EVIDENCE, MAX_MOTION_EVIDENCE);
         let given = match given_head.filter(|head| head.frame_idx == k) {
             Some(head) if head.forward => GIVEN_HEAD_EVIDENCE,
             Some(_) => -GIVEN_HEAD_EVIDENCE,
@@ -104,16 +105,6 @@ fn evidence(
         Some(motion + ends[k].unwrap_or(0.0) + given)
     };
     (0..axes.len()).map(evidence_at).collect()
-}
-
-/// Returns the evidence of motion at a speed along +axis, body lengths per second.
-pub(super) fn of_motion(speed_bl_s: f64) -> f64 {
-    limited(speed_bl_s / UNIT_SPEED_BL_S)
-}
-
-/// Returns evidence of one kind in one frame, within its limits.
-pub(super) fn limited(evidence: f64) -> f64 {
-    evidence.clamp(-MAX_EVIDENCE, MAX_EVIDENCE)
 }
 
 /// Returns the speed along +axis in each frame, body lengths per second.

@@ -12,7 +12,6 @@ pub mod direction;
 mod heading;
 pub mod midline;
 pub mod moments;
-pub mod robust;
 mod smooth;
 pub mod sprite;
 #[cfg(test)]

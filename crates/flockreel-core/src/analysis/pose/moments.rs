@@ -9,8 +9,6 @@ use crate::raster::Mask;
 
 /// Least ratio of the eigenvalues for an axis; rounder silhouettes have none. Free choice.
 const MIN_EIGENVALUE_RATIO: f64 = 1.05;
-/// Least ratio of the standard deviations along and across the axis for a body with two ends. Free choice.
-const MIN_ELONGATION: f64 = 1.25;
 
 /// Moments of one silhouette.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,13 +28,6 @@ pub struct Moments {
     pub eigenvalue_ratio: f64,
     /// Third standardized moment along the major axis, and along the axis a quarter turn further.
     pub skew: [f64; 2],
-}
-
-impl Moments {
-    /// Returns whether the body is long enough to have two ends.
-    pub fn is_long(&self) -> bool {
-        self.eigenvalue_ratio >= MIN_ELONGATION * MIN_ELONGATION
-    }
 }
 
 /// Returns the moments of weights 0..=255 over a box; `None` when all are zero.

@@ -4,8 +4,12 @@
 //! Large innovations get Huber weights. Second differences of the data give the measurement noise. The
 //! process noise is the candidate with the greatest likelihood. See docs/explanation/algorithms.md, "Pose".
 
-use super::robust::{self, SPAN_S};
 use crate::order::median;
+
+/// Standard deviations beyond which an innovation counts less. Free choice.
+const HUBER: f64 = 2.5;
+/// Longest gap that is bridged, seconds. Free choice.
+const BRIDGE_S: f64 = 0.5;
 
 /// Returns the rates of change of measurements taken every `1 / fps` seconds, per second. `None` marks a
 /// missing measurement.
@@ -27,7 +31,7 @@ pub(super) fn smoothed_rates(measured: &[Option<f64>], fps: f64) -> Vec<Option<f
                 if next.0 > best.0 { next } else { best }
             });
     let filtered = filter(measured, dt, best.1, noise);
-    let max_gap = (SPAN_S * fps).round() as usize;
+    let max_gap = (BRIDGE_S * fps).round() as usize;
     smooth_backward(&filtered, measured, dt, max_gap)
 }
 
@@ -75,9 +79,15 @@ fn filter(measured: &[Option<f64>], dt: f64, q: f64, r: f64) -> Filtered {
             let innovation = z - state.x[0];
             let expected = state.p[0][0] + r;
             let sigmas = innovation.abs() / expected.sqrt();
-            filtered.log_likelihood -= 0.5 * (robust::loss(sigmas) + libm::log(expected));
+            let loss = if sigmas > HUBER {
+                2.0 * HUBER * sigmas - HUBER * HUBER
+            } else {
+                sigmas * sigmas
+            };
+            filtered.log_likelihood -= 0.5 * (loss + libm::log(expected));
             // Huber weight: a large innovation counts as a measurement with more noise.
-            let s = state.p[0][0] + r / robust::weight(sigmas);
+            let weight = if sigmas > HUBER { HUBER / sigmas } else { 1.0 };
+            let s = state.p[0][0] + r / weight;
             let k = [state.p[0][0] / s, state.p[1][0] / s];
             let [[a, b], [_, d]] = state.p;
             state = State {

@@ -4,7 +4,6 @@
 
 use std::sync::Arc;
 
-use super::robust::SPAN_S;
 use crate::analysis::track::sighting::Sighting;
 use crate::analysis::track::{Track, Tracked};
 use crate::library::{Matte, Poses, Sprites, View};
@@ -19,14 +18,15 @@ const SIZE_STEP: u32 = 8;
 
 /// Smallest and greatest scale of a sprite. Free choice.
 const SCALE_RANGE: [f64; 2] = [0.25, 1.5];
+/// Span of the running median of the height, seconds: fins open and close. Free choice.
+const HEIGHT_SPAN_S: f64 = 0.5;
 
 /// Returns each frame's scale, relative to the frame with the animal's median height, rounded to 5 decimals.
 ///
 /// The apparent depth decides instead of the height if depths were measured. Frames without a value get 1.
 pub fn scales(poses: &Poses) -> Vec<f64> {
     let frames = &poses.frames;
-    // Fins open and close.
-    let half_span = (SPAN_S * poses.fps / 2.0).round() as usize;
+    let half_span = (HEIGHT_SPAN_S * poses.fps / 2.0).round() as usize;
     let median_height_px = |frame: usize| {
         let around = frame.saturating_sub(half_span)..(frame + half_span + 1).min(frames.len());
         median(frames[around].iter().filter_map(|pose| pose.height_px))

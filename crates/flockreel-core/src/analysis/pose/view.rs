@@ -3,7 +3,6 @@
 
 use std::f64::consts::FRAC_PI_3;
 
-use super::robust::MIN_FRAMES;
 use crate::analysis::track::Tracked;
 use crate::analysis::track::sighting::Sighting;
 use crate::library::View;
@@ -11,6 +10,10 @@ use crate::order::{median, percentile};
 
 /// Least length of a usable silhouette, as a share of the 90th percentile of lengths. Free choice.
 const MIN_LENGTH_SHARE: f64 = 0.7;
+/// Least ratio of the standard deviations along and across the axis. Free choice.
+const MIN_ELONGATION: f64 = 1.3;
+/// Least number of usable frames; with fewer the view is unknown. Free choice.
+const MIN_FRAMES: usize = 8;
 /// Asymmetry at which both views are equally likely, standard deviations squared. On the labelled clips, it
 /// is 0.07 to 0.7 from above and at least 4 from the side.
 const EVEN_ASYMMETRY: f64 = 1.7;
@@ -34,7 +37,7 @@ pub(super) fn guess(track: &[Tracked]) -> (View, f64) {
     let longest = percentile(&mut lengths, 0.9).unwrap_or(0.0);
     let level: Vec<&Sighting> = whole()
         .filter(|s| s.extent_px[0] >= MIN_LENGTH_SHARE * longest)
-        .filter(|s| s.moments.is_long())
+        .filter(|s| s.moments.eigenvalue_ratio >= MIN_ELONGATION * MIN_ELONGATION)
         .filter(|s| {
             s.moments
                 .major_rad

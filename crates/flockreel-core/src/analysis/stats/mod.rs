@@ -65,7 +65,7 @@ fn speeds(poses: &Poses, length_px: f64) -> Option<[f64; 3]> {
 
 /// Returns the 95th percentile of the turning rate, radians per second, over 0.1 s on each side of a frame.
 fn turn_rate(poses: &Poses) -> Option<f64> {
-    let half_span = pose::robust::half_span(poses.fps);
+    let half_span = ((poses.fps * 0.1).round() as usize).max(1);
     let rate = |pair: &[Pose]| {
         let (first, last) = (pair[0].heading_rad?, pair[2 * half_span].heading_rad?);
         Some(wrap_rad(last - first).abs() * poses.fps / (2 * half_span) as f64)

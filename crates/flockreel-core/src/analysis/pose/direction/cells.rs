@@ -6,7 +6,6 @@ use std::f64::consts::{PI, TAU};
 use super::body::{BodyAxes, MOMENT_AXES, bilinear_form};
 use super::observations::Silhouette;
 use super::shape::Shape;
-use crate::analysis::pose::robust;
 
 pub(super) const N_YAW: usize = 36;
 pub(super) const N_PITCH: usize = 13;
@@ -20,6 +19,8 @@ const MAX_PITCH_RAD: f64 = PI / 3.0;
 const MOTION_BL: [f64; 3] = [0.25, 0.25, 0.6];
 /// Standard deviation of the pitch, radians. Free choice.
 const PITCH_NOISE: f64 = 0.4;
+/// Residuals grow linearly beyond this many standard deviations. Free choice.
+const HUBER: f64 = 3.0;
 
 /// The cells, with the expected measurements for each.
 pub(super) struct Cells {
@@ -78,7 +79,7 @@ impl Cells {
             let speed = (dot(&along, &moved) / dot(&along, &along)).max(0.0);
             let residual: [f64; 3] = std::array::from_fn(|c| moved[c] - speed * along[c]);
             let pitch = self.pitch[k % N_PITCH] / PITCH_NOISE;
-            0.5 * robust::loss(dot(&residual, &residual).sqrt()) + 0.5 * pitch * pitch
+            0.5 * huber_loss(dot(&residual, &residual)) + 0.5 * pitch * pitch
         };
         self.axes.iter().enumerate().map(cost).collect()
     }
@@ -100,7 +101,7 @@ impl Cells {
                     * (b * residual[0] * residual[1]
                         + c * residual[0] * residual[2]
                         + e * residual[1] * residual[2]);
-            *cost += 0.5 * robust::loss(square.max(0.0).sqrt()) + self.half_log_det[k];
+            *cost += 0.5 * huber_loss(square) + self.half_log_det[k];
         }
     }
 
@@ -152,4 +153,12 @@ fn inverse_covariance(m: [f64; 3], sway: [f64; 3], shape: &Shape) -> ([f64; 6], 
     ];
     let det = (a * minors[0] + b * minors[1] + c * minors[2]).max(1e-300);
     (minors.map(|v| v / det), 0.5 * libm::log(det))
+}
+
+fn huber_loss(square: f64) -> f64 {
+    if square > HUBER * HUBER {
+        HUBER * (2.0 * square.sqrt() - HUBER)
+    } else {
+        square
+    }
 }

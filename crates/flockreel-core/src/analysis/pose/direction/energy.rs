@@ -13,10 +13,10 @@ use super::banded::NormalEquations;
 use super::body::{BodyAxes, MOMENT_AXES, bilinear_form};
 use super::observations::{Observation, Observations, PIXEL_MOMENTS_PX2, Silhouette};
 use super::shape::{MAX_BEND_RATE, Shape};
-use super::state::Unknown::{self, LogZ, Pitch, Speed, Sway, Yaw};
-use super::state::{N_STATE, State};
-use crate::analysis::pose::robust;
+use super::state::{LOG_Z, N_STATE, PITCH, SPEED, SWAY, State, YAW};
 
+/// Residuals of measurements grow linearly beyond this many standard deviations (Huber 1964). Free choice.
+const HUBER: f64 = 2.5;
 /// Standard deviation of a centroid coordinate, pixels. Free choice.
 const CENTROID_NOISE_PX: f64 = 0.2;
 /// Standard deviation of the sideways speed, body lengths per second. Free choice.
@@ -64,23 +64,20 @@ type Add<'a> = dyn FnMut(Residual<'_>) + 'a;
 /// One frame of a sequence of states.
 struct Frame<'a> {
     /// Index of the first unknown of the frame.
-    first: usize,
+    at: usize,
     state: &'a State,
     axes: BodyAxes,
     observation: &'a Observation,
 }
 
-impl Frame<'_> {
-    /// Returns the index of an unknown of the frame.
-    fn at(&self, unknown: Unknown) -> usize {
-        self.first + unknown as usize
-    }
-}
-
 impl Residual<'_> {
+    fn is_outlier(&self) -> bool {
+        self.robust && self.value.abs() > HUBER
+    }
+
     fn energy(&self) -> f64 {
-        let loss = if self.robust {
-            robust::loss(self.value)
+        let loss = if self.is_outlier() {
+            HUBER * (2.0 * self.value.abs() - HUBER)
         } else {
             self.value * self.value
         };
@@ -102,8 +99,8 @@ impl Energy<'_> {
         let mut cost = 0.0;
         self.visit(start, states, &mut |residual| {
             cost += residual.energy();
-            let huber_weight = if residual.robust {
-                robust::weight(residual.value)
+            let huber_weight = if residual.is_outlier() {
+                HUBER / residual.value.abs()
             } else {
                 1.0
             };
@@ -119,7 +116,7 @@ impl Energy<'_> {
         let frames: Vec<Frame> = (states.iter().zip(&self.observations.frames[start..]))
             .enumerate()
             .map(|(k, (state, observation))| Frame {
-                first: k * N_STATE,
+                at: k * N_STATE,
                 state,
                 axes: BodyAxes::new(state.yaw, state.pitch),
                 observation,
@@ -158,10 +155,10 @@ impl Energy<'_> {
                 weight: self.observations.frame_weight(),
                 robust: true,
                 slopes: &[
-                    (frame.at(LogZ), -2.0 * value / noise[c]),
-                    (frame.at(Yaw), by_yaw / noise[c]),
-                    (frame.at(Pitch), by_pitch / noise[c]),
-                    (frame.at(Sway), by_sway / noise[c]),
+                    (frame.at + LOG_Z, -2.0 * value / noise[c]),
+                    (frame.at + YAW, by_yaw / noise[c]),
+                    (frame.at + PITCH, by_pitch / noise[c]),
+                    (frame.at + SWAY, by_sway / noise[c]),
                 ],
             });
         }
@@ -176,8 +173,8 @@ impl Energy<'_> {
             weight: self.observations.frame_weight(),
             robust: true,
             slopes: &[
-                (frame.at(LogZ), -1.0 / noise),
-                (frame.at(Pitch), extent.m_by_pitch / extent.m / noise),
+                (frame.at + LOG_Z, -1.0 / noise),
+                (frame.at + PITCH, extent.m_by_pitch / extent.m / noise),
             ],
         });
     }
@@ -185,21 +182,21 @@ impl Energy<'_> {
     /// Adds the residuals of backward speed, of pitch, and of directions away from the head in the image.
     fn add_direction_priors(&self, frame: &Frame, add: &mut Add) {
         let weight = self.observations.frame_weight();
-        let (state, axes) = (frame.state, &frame.axes);
+        let (state, axes, at) = (frame.state, &frame.axes, frame.at);
         let backward = state.speed.min(0.0) / (BACKWARD_BL * self.shape.length_m);
         if backward < 0.0 {
             add(Residual {
                 value: backward,
                 weight: 1.0,
                 robust: true,
-                slopes: &[(frame.at(Speed), backward / state.speed)],
+                slopes: &[(at + SPEED, backward / state.speed)],
             });
         }
         add(Residual {
             value: state.pitch / PITCH_NOISE,
             weight,
             robust: false,
-            slopes: &[(frame.at(Pitch), 1.0 / PITCH_NOISE)],
+            slopes: &[(at + PITCH, 1.0 / PITCH_NOISE)],
         });
         let given = frame.observation.given_head;
         let given = given.map(|toward| toward.map(|c| c / GIVEN_HEAD_NOISE));
@@ -209,8 +206,8 @@ impl Energy<'_> {
             let value = along(axes.forward);
             if value < 0.0 {
                 let slopes = &[
-                    (frame.at(Yaw), along(axes.by_yaw().forward)),
-                    (frame.at(Pitch), along(axes.by_pitch().forward)),
+                    (at + YAW, along(axes.by_yaw().forward)),
+                    (at + PITCH, along(axes.by_pitch().forward)),
                 ];
                 add(Residual {
                     value,
@@ -231,6 +228,7 @@ impl Energy<'_> {
         let factor = if are_detected { 1.0 } else { INTERPOLATED_SLIP };
         let slip = factor * libm::hypot(SLIP_BL * self.shape.length_m, pixel / observations.dt);
         let speed = (pair[0].state.speed + pair[1].state.speed) / 2.0;
+        let at = pair.map(|frame| frame.at);
         let slopes = pair.map(|frame| {
             let [x, y] = frame.observation.slope;
             [x, y, observations.medium_index]
@@ -248,14 +246,14 @@ impl Energy<'_> {
                 weight: observations.frame_weight(),
                 robust: true,
                 slopes: &[
-                    (pair[0].at(LogZ), moved[0]),
-                    (pair[0].at(Yaw), half * by_yaw[0][c]),
-                    (pair[0].at(Pitch), half * by_pitch[0][c]),
-                    (pair[0].at(Speed), -forward / 2.0 / slip),
-                    (pair[1].at(LogZ), moved[1]),
-                    (pair[1].at(Yaw), half * by_yaw[1][c]),
-                    (pair[1].at(Pitch), half * by_pitch[1][c]),
-                    (pair[1].at(Speed), -forward / 2.0 / slip),
+                    (at[0] + LOG_Z, moved[0]),
+                    (at[0] + YAW, half * by_yaw[0][c]),
+                    (at[0] + PITCH, half * by_pitch[0][c]),
+                    (at[0] + SPEED, -forward / 2.0 / slip),
+                    (at[1] + LOG_Z, moved[1]),
+                    (at[1] + YAW, half * by_yaw[1][c]),
+                    (at[1] + PITCH, half * by_pitch[1][c]),
+                    (at[1] + SPEED, -forward / 2.0 / slip),
                 ],
             });
         }
@@ -276,10 +274,10 @@ impl Energy<'_> {
         if let [a, b, ..] = frames {
             let slope = 1.0 / (dt * TURN_RATE);
             let turned = b.state.yaw - a.state.yaw;
-            add(turned * slope, &[(a.at(Yaw), -slope), (b.at(Yaw), slope)]);
+            add(turned * slope, &[(a.at + YAW, -slope), (b.at + YAW, slope)]);
             let slope = 1.0 / (SPEED_CHANGE_BL * self.shape.length_m * root);
             let faster = b.state.speed - a.state.speed;
-            let terms = [(a.at(Speed), -slope), (b.at(Speed), slope)];
+            let terms = [(a.at + SPEED, -slope), (b.at + SPEED, slope)];
             add(faster * slope, &terms);
         }
         let [a, b, c, ..] = frames else {
@@ -287,15 +285,15 @@ impl Energy<'_> {
         };
         let states = [a.state, b.state, c.state];
         for (unknown, change, angles) in [
-            (Yaw, TURN_CHANGE, states.map(|s| s.yaw)),
-            (Pitch, PITCH_CHANGE, states.map(|s| s.pitch)),
+            (YAW, TURN_CHANGE, states.map(|s| s.yaw)),
+            (PITCH, PITCH_CHANGE, states.map(|s| s.pitch)),
         ] {
             let slope = 1.0 / (dt * change * root);
             let second = angles[0] - 2.0 * angles[1] + angles[2];
             let terms = [
-                (a.at(unknown), slope),
-                (b.at(unknown), -2.0 * slope),
-                (c.at(unknown), slope),
+                (a.at + unknown, slope),
+                (b.at + unknown, -2.0 * slope),
+                (c.at + unknown, slope),
             ];
             add(second * slope, &terms);
         }
@@ -308,9 +306,9 @@ impl Energy<'_> {
         };
         let scale = 1.0 / self.shape.sway_sd;
         let terms = [
-            (a.at(Yaw), by_yaw * scale),
-            (b.at(Sway), scale),
-            (c.at(Yaw), -by_yaw * scale),
+            (a.at + YAW, by_yaw * scale),
+            (b.at + SWAY, scale),
+            (c.at + YAW, -by_yaw * scale),
         ];
         add((b.state.sway - bend) * scale, &terms);
     }

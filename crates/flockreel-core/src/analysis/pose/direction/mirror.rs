@@ -15,6 +15,8 @@ use super::solve;
 use super::state::State;
 use crate::geometry::wrap_rad;
 
+/// Largest number of passes over all ranges. Free choice.
+const N_PASSES: usize = 2;
 /// Number of frames on each side of a range that are optimised with it. Free choice.
 const MARGIN: usize = 20;
 /// Longest range that is tried, seconds. Free choice.
@@ -33,11 +35,10 @@ enum Plane {
     LineOfSight,
 }
 
-/// Mirrors each range whose mirrored version has clearly less energy, until there is none.
+/// Mirrors each range whose mirrored version has clearly less energy.
 pub(super) fn improve(energy: &Energy, states: &mut [State]) {
-    let mut changed = true;
-    while changed {
-        changed = false;
+    for _ in 0..N_PASSES {
+        let mut changed = false;
         for plane in [Plane::Image, Plane::LineOfSight] {
             for n_turns in [1, 2] {
                 let agreements = agreements(states, plane);
@@ -48,6 +49,9 @@ pub(super) fn improve(energy: &Energy, states: &mut [State]) {
                 changed |= !better.is_empty();
                 accept(states, better);
             }
+        }
+        if !changed {
+            break;
         }
     }
 }

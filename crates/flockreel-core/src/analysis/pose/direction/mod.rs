@@ -9,7 +9,7 @@
 //! 2. Gauss-Newton (`energy`, `solve`) finds the most probable depth, yaw, pitch, speed and sway.
 //! 3. Each turn is also tried mirrored (`mirror`), because approaching and receding animals look alike.
 //!
-//! A first pass of 1 and 2 learns the shape of the body, and a second round of 2 and 3 refines it.
+//! The body shape is estimated again between rounds.
 
 mod banded;
 mod body;
@@ -95,6 +95,9 @@ pub struct Direction {
     pub depth_sign_confidence: f64,
 }
 
+/// Number of final rounds: shape estimate, fit, mirrored turns, fit. Free choice.
+const N_ROUNDS: usize = 2;
+
 /// Returns the direction in every frame with a detection or in a gap of at most 0.5 s.
 ///
 /// All entries are `None` when the footage has uncut silhouettes for less than one second or fewer than 8
@@ -133,7 +136,7 @@ fn estimate_observed(
     shape = shape.refined(observations, &states);
     let course = sphere::decode(observations, &shape);
     states = course.initial_states(observations, &shape);
-    for round in 0..2 {
+    for round in 0..N_ROUNDS {
         if round > 0 {
             shape = shape.refined(observations, &states);
         }

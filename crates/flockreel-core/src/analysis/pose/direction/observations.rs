@@ -4,8 +4,12 @@
 use super::Measurement;
 use super::body::BodyAxes;
 use super::state::State;
-use crate::analysis::pose::robust::{MIN_FRAMES, SPAN_S};
 use crate::geometry::Camera;
+
+/// Longest gap between detections that is interpolated, seconds. Free choice.
+const BRIDGE_S: f64 = 0.5;
+/// Smallest number of uncut silhouettes. One second of them is needed too. Free choice.
+const MIN_SILHOUETTES: usize = 8;
 
 /// Second moments xx, xy and yy of one pixel, which is a square, in square pixels.
 pub(super) const PIXEL_MOMENTS_PX2: [f64; 3] = [1.0 / 12.0, 0.0, 1.0 / 12.0];
@@ -15,7 +19,7 @@ pub(super) struct Observations {
     /// Frame number in the footage of `frames[0]`.
     pub(super) first: usize,
     pub(super) frames: Vec<Observation>,
-    /// True for frames with a detection and for frames in a gap of at most `SPAN_S`.
+    /// True for frames with a detection and for frames in a gap of at most `BRIDGE_S`.
     pub(super) bridged: Vec<bool>,
     /// Time between frames, seconds.
     pub(super) dt: f64,
@@ -107,7 +111,7 @@ impl Observations {
                         slope: [0, 1].map(|c| from[c] + (slope[c] - from[c]) * share),
                         ..Observation::default()
                     });
-                    bridged.push((n_steps - 1) as f64 <= SPAN_S * fps);
+                    bridged.push((n_steps - 1) as f64 <= BRIDGE_S * fps);
                 }
             }
             last_detected = k;
@@ -115,7 +119,7 @@ impl Observations {
             bridged.push(true);
         }
         let n_whole = frames.iter().filter(|f| f.silhouette.is_some()).count();
-        (n_whole as f64 >= fps && n_whole >= MIN_FRAMES).then_some(Observations {
+        (n_whole as f64 >= fps && n_whole >= MIN_SILHOUETTES).then_some(Observations {
             first,
             frames,
             bridged,

@@ -6,7 +6,6 @@
 use super::body::{BodyAxes, MOMENT_AXES, bilinear_form};
 use super::observations::{Observation, Observations, PIXEL_MOMENTS_PX2, Silhouette};
 use super::state::State;
-use crate::analysis::pose::robust;
 use crate::library::Animal;
 use crate::order::{median, percentile};
 
@@ -36,8 +35,12 @@ pub(super) struct Shape {
 
 /// Yaw rates above this do not bend the body further, radians per second. Free choice.
 pub(super) const MAX_BEND_RATE: f64 = 4.0;
+/// Half the time span over which the direction of motion is measured, seconds. Free choice.
+const HALF_SPAN_S: f64 = 0.1;
 /// Below this speed, in body lengths per second, the direction of motion is not used. Free choice.
 const MIN_SPEED_BL: f64 = 0.4;
+/// Initial standard deviation of the sway, as a share of the moment along the forward axis. Free choice.
+const INITIAL_SWAY: f64 = 0.15;
 /// Smallest standard deviation of the sway, as a share of the moment along the forward axis. Free choice.
 const MIN_SWAY: f64 = 0.1;
 /// Initial standard deviation of the vertical extent, as a share of it. Free choice.
@@ -76,7 +79,7 @@ impl Shape {
             side_m2: (0.8 * head_on_ratio * down_m2).clamp(0.02 * down_m2, down_m2),
             slant_m2: slant_m2(observations, animal, excess_m2, broadside()).unwrap_or(0.0),
             bend: 0.0,
-            sway_sd: MIN_SWAY * along_m2,
+            sway_sd: INITIAL_SWAY * along_m2,
             vertical_noise: INITIAL_VERTICAL_NOISE,
             moment_noise: 1.0,
         })
@@ -246,7 +249,7 @@ fn slant_m2<'a>(
     excess_m2: f64,
     broadside: impl Iterator<Item = &'a (usize, &'a Silhouette)>,
 ) -> Option<f64> {
-    let half_span = robust::half_span(1.0 / observations.dt);
+    let half_span = ((HALF_SPAN_S / observations.dt).round() as usize).max(1);
     median(broadside.filter_map(|&(k, silhouette)| {
         let (last, next) = (k.checked_sub(half_span)?, k + half_span);
         let (from, to) = (

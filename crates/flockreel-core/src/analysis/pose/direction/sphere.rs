@@ -14,7 +14,6 @@ use super::hidden_markov;
 use super::observations::Observations;
 use super::shape::Shape;
 use super::state::State;
-use crate::analysis::pose::heading::GIVEN_HEAD_EVIDENCE;
 use crate::geometry::wrap_rad;
 
 /// Weight of one frame's cost at 30 frames per second. Below 1, because successive frames are not
@@ -22,6 +21,8 @@ use crate::geometry::wrap_rad;
 const EVIDENCE: f64 = 0.35;
 /// Cells below this probability do not count toward the confidence. Free choice.
 const NEGLIGIBLE: f64 = 1e-6;
+/// Cost of a direction away from a head given by the user. High enough to exclude it.
+const GIVEN_HEAD_COST: f64 = 1e4;
 
 /// The decoded course.
 pub(super) struct Course {
@@ -63,12 +64,7 @@ pub(super) fn decode(observations: &Observations, shape: &Shape) -> Course {
             if let Some([x, y]) = head_evidence {
                 *cost -= x * axes.forward[0] + y * axes.forward[1];
             }
-            *cost = *cost * evidence_weight
-                + if points_away {
-                    GIVEN_HEAD_EVIDENCE
-                } else {
-                    0.0
-                };
+            *cost = *cost * evidence_weight + if points_away { GIVEN_HEAD_COST } else { 0.0 };
         }
         cost
     };

@@ -2,16 +2,12 @@
 
 /// Number of unknowns per frame.
 pub(super) const N_STATE: usize = 5;
-
-/// The unknowns of a frame, in their order.
-#[derive(Clone, Copy)]
-pub(super) enum Unknown {
-    LogZ,
-    Yaw,
-    Pitch,
-    Speed,
-    Sway,
-}
+/// Indices of the unknowns among those of a frame.
+pub(super) const LOG_Z: usize = 0;
+pub(super) const YAW: usize = 1;
+pub(super) const PITCH: usize = 2;
+pub(super) const SPEED: usize = 3;
+pub(super) const SWAY: usize = 4;
 
 /// The unknowns of one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,11 +29,11 @@ impl State {
     /// Returns the state after a step, which has one value for each unknown.
     pub(super) fn moved(&self, step: &[f64]) -> State {
         State {
-            log_z: self.log_z + step[Unknown::LogZ as usize],
-            yaw: self.yaw + step[Unknown::Yaw as usize],
-            pitch: self.pitch + step[Unknown::Pitch as usize],
-            speed: self.speed + step[Unknown::Speed as usize],
-            sway: self.sway + step[Unknown::Sway as usize],
+            log_z: self.log_z + step[LOG_Z],
+            yaw: self.yaw + step[YAW],
+            pitch: self.pitch + step[PITCH],
+            speed: self.speed + step[SPEED],
+            sway: self.sway + step[SWAY],
         }
     }
 }

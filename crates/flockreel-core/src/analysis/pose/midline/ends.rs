@@ -40,18 +40,18 @@ fn excess_curvature(outline: &[[f64; 2]]) -> Vec<f64> {
 
 /// Returns the center of the excess curvature near an index, by four iterations of the weighted mean.
 fn curvature_center(excess: &[f64], start: usize) -> usize {
-    let near = N_POINTS as i64 / 6;
+    const NEAR: i64 = N_POINTS as i64 / 6;
     let at = |offset: i64| (start as i64 + offset).rem_euclid(N_POINTS as i64) as usize;
     let mut shift = 0;
     for _ in 0..4 {
         let (mut sum, mut total) = (0.0, 0.0);
-        for offset in shift - near..=shift + near {
+        for offset in shift - NEAR..=shift + NEAR {
             let weight = excess[at(offset)].max(0.0);
             sum += weight * offset as f64;
             total += weight;
         }
         if total > 0.0 {
-            shift = ((sum / total).round() as i64).clamp(-near, near);
+            shift = ((sum / total).round() as i64).clamp(-NEAR, NEAR);
         }
     }
     at(shift)

@@ -11,7 +11,7 @@ use crate::library::{Poses, View};
 
 /// Largest difference between turning rates in top view, radians per second: 20 degrees per second. Free
 /// choice.
-pub const TURN_GATE_RAD_PER_S: f64 = TAU / 18.0;
+const TURN_GATE_RAD_PER_S: f64 = TAU / 18.0;
 
 /// Decides which pairs of clips pass.
 pub(super) struct Gate {

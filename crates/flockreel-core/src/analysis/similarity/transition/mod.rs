@@ -11,7 +11,6 @@ mod gate;
 mod tests;
 
 use gate::Gate;
-pub use gate::TURN_GATE_RAD_PER_S;
 
 use crate::analysis::similarity::distance::{
     Cancelled, ClipPair, ComparedSprites, Distances, LocalMinima, Marks, PairFilter, Side,

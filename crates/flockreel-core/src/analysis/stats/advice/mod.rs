@@ -7,8 +7,6 @@
 //! sprites are rotated to any heading, so the turns matter. Mirrored playback turns left into right.
 
 use crate::analysis::Params;
-use crate::analysis::pose::robust;
-use crate::analysis::similarity::transition::TURN_GATE_RAD_PER_S;
 use crate::geometry::wrap_rad;
 use crate::library::{Library, Poses, View};
 
@@ -20,12 +18,17 @@ pub use kind::{Advice, Motion};
 const MIN_MOTION_S: f64 = 0.5;
 /// Number of 10-degree bins from the horizontal to the start of "up" and "down". Free choice.
 const LEVEL_BINS: usize = 3;
+/// Up to this turning rate the animal moves straight, radians per second. Equal to the gate of
+/// transitions in top view.
+const STRAIGHT_RAD_PER_S: f64 = 20.0 * std::f64::consts::PI / 180.0;
 /// Above this turning rate the animal turns, radians per second. High enough to exclude heading noise.
 const TURNING_RAD_PER_S: f64 = 45.0 * std::f64::consts::PI / 180.0;
 /// A guessed view below this probability gives advice. Free choice.
 const MIN_VIEW_PROBABILITY: f64 = 0.9;
 /// Speed below which the animal rests, body lengths per second. Free choice.
 const REST_BL_PER_S: f64 = 0.1;
+/// Half the time span over which speed and turning rate are measured, seconds. Free choice.
+const HALF_SPAN_S: f64 = 0.1;
 
 /// Returns the advice for a library, the most severe first; empty for a good library.
 pub fn advice(library: &Library, params: &Params) -> Vec<Advice> {
@@ -202,7 +205,7 @@ fn turn_coverage(library: &Library, motion: &[FrameMotion], mirror: bool) -> Vec
         frame.turn_rad_per_s < -TURNING_RAD_PER_S
     });
     let straight = count(Motion::Straight, &|frame| {
-        frame.moves && frame.turn_rad_per_s.abs() <= TURN_GATE_RAD_PER_S
+        frame.moves && frame.turn_rad_per_s.abs() <= STRAIGHT_RAD_PER_S
     });
     if mirror {
         vec![left.or(right, Motion::Turning), straight]
@@ -222,7 +225,7 @@ struct FrameMotion {
 fn motion(library: &Library) -> Vec<FrameMotion> {
     let poses = &library.poses;
     let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
-    let half_span = robust::half_span(poses.fps);
+    let half_span = ((poses.fps * HALF_SPAN_S).round() as usize).max(1);
     let motion_at = |frame: usize| {
         let (before, after) = (frame.checked_sub(half_span)?, frame + half_span);
         motion_between(poses, before, after, length_px)
