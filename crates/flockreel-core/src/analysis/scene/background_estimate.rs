@@ -180,7 +180,9 @@ impl BackgroundEstimate {
             let survey = estimate.survey(samples);
             (estimate, survey)
         });
-        let shows_animal = of_states.1.ghost_share() > MAX_GHOST_SHARE;
+        let n_found = of_states.1.animal.iter().flatten().count();
+        let shows_animal =
+            of_states.1.ghost_share() > MAX_GHOST_SHARE || 2 * n_found <= of_states.1.animal.len();
         if !shows_animal && of_states.1.explained() > of_windows.1.explained() {
             of_states
         } else {

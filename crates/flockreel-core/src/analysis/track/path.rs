@@ -14,6 +14,10 @@ use crate::order;
 /// Cost from which a look is never a candidate. Free choice.
 pub(super) const MAX_COST: f64 = 24.0;
 
+/// Least number of frames in which the largest body is followed, as a share of those of the body that is followed
+/// longest. A larger one may be a web that trembles. Free choice.
+const MIN_FOUND_SHARE: f64 = 0.1;
+
 /// Chooses a candidate, or none, for each frame, with the probability that it is the animal.
 ///
 /// `pin` is a frame and the index of its candidate that is known to be the animal. The probability is that of the
@@ -38,10 +42,12 @@ pub(super) fn choose(
         (Some(anchor), _) => Some(path_of(anchor)),
         (None, Follow::One) => best_fitting(&bodies).map(path_of),
         (None, Follow::Largest) => {
-            let paths = together(&bodies).into_iter().map(path_of);
-            let paths = paths.map(|path| (median_area_px(&path, frames), path));
-            let largest = paths.max_by(|a, b| a.0.total_cmp(&b.0));
-            largest.map(|(_, path)| path)
+            let mut paths: Vec<_> = together(&bodies).into_iter().map(path_of).collect();
+            let n_found = |path: &Vec<_>| path.iter().flatten().count();
+            let most = paths.iter().map(n_found).max().unwrap_or(0);
+            paths.retain(|path| n_found(path) as f64 >= MIN_FOUND_SHARE * most as f64);
+            let area_px = |path: &Vec<_>| median_area_px(path, frames);
+            (paths.into_iter()).max_by(|a, b| area_px(a).total_cmp(&area_px(b)))
         }
     };
     path.unwrap_or_else(|| vec![None; frames.len()])
