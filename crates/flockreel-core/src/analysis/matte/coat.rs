@@ -36,7 +36,7 @@ impl Coat {
     /// in the same box.
     ///
     /// A pixel of a silhouette counts by the probability that it shows the animal rather than the background or
-    /// its shadow, where nothing but [`COAT_DENSITY`] is known of the animal's colors.
+    /// its shadow, where nothing but `COAT_DENSITY` is known of the animal's colors.
     pub fn learn(seen: &[(Difference, &Background, Mask)], grows: bool) -> Coat {
         let pixels = |side: u8| {
             seen.iter().flat_map(move |(difference, background, mask)| {
