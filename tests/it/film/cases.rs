@@ -92,8 +92,8 @@ fn hand_at_the_start_is_reported_and_not_measured() {
     let others = &library.poses.other_movers;
     let hand = others.iter().find(|m| m.kind == MoverKind::FromBorder);
     let hand = hand.unwrap_or_else(|| panic!("the hand is not reported: {others:?}"));
-    // Until the hand moves, it may be part of the background.
-    assert!(hand.from_s < 1.0 && hand.to_s < 2.0, "{hand:?}");
+    // The hand moves from 0.7 to 1.5 s. Until it has left the place where it rested, it may be part of the background.
+    assert!(hand.from_s < 1.2 && hand.to_s < 2.0, "{hand:?}");
 }
 
 #[test]
