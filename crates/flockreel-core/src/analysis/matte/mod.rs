@@ -30,7 +30,7 @@ pub struct Matte {
     pub image: RgbaImage,
 }
 
-/// A frame, with all that the animal is told from its scene by.
+/// A frame with its background, its light and the learned colors: the input of a cut.
 pub struct View<'a> {
     /// The frame.
     pub frame: &'a Frame,

@@ -165,8 +165,8 @@ impl BackgroundEstimate {
     }
 
     /// Returns the backgrounds for the first survey, and the survey: those of the states or those of short time
-    /// windows, whichever explain the samples better. The states show an animal that lingers; short windows show
-    /// one that moves, even where the scene changes over time.
+    /// windows, whichever explain the samples better. The states show an animal that lingers, unless it stays at one
+    /// place for most of the film; short windows show one that moves, even where the scene changes over time.
     pub(super) fn for_first_survey(&self, samples: &Samples) -> (BackgroundEstimate, Survey) {
         let windows = self.groups.iter();
         let windows = windows.flat_map(|&group| windows::short_windows(group));

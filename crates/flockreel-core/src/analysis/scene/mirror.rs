@@ -41,7 +41,7 @@ impl Mirror {
             .into_iter()
             .flat_map(|x| [rect.y, rect.bottom()].map(|y| [x, f64::from(y)]));
         let n_behind = corners.filter(|&corner| self.is_image(corner)).count();
-        if n_behind.is_multiple_of(4) {
+        if matches!(n_behind, 0 | 4) {
             return vec![component];
         }
         let mut sides = [component.mask(rect), component.mask(rect)];
@@ -60,7 +60,7 @@ impl Mirror {
         let step = |[a, b]: &[&Look; 2]| [0, 1].map(|c| a.centroid_px[c] - b.centroid_px[c]);
         let middle =
             |[a, b]: &[&Look; 2]| [0, 1].map(|c| (a.centroid_px[c] + b.centroid_px[c]) / 2.0);
-        // The direction of most steps, without a sign: the axis of their second moments, of unit steps.
+        // The mean axis of the steps. Their angles are doubled, because a step and its opposite have one axis.
         let mut doubled = [0.0; 2];
         for [dx, dy] in pairs.iter().map(step) {
             let angle = 2.0 * libm::atan2(dy, dx);

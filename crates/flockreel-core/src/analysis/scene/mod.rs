@@ -45,6 +45,8 @@ use refusal::SimilarObjects;
 use samples::Samples;
 use survey::Survey;
 
+/// Largest share of blocks that may differ where a frame shows a background's scene, 0..=1. Free choice.
+const MAX_DIFFERING_SHARE: f64 = 0.5;
 /// Number of times that still parts of the animal are taken out of the backgrounds. Free choice: it bounds the
 /// time.
 const MAX_REPAIRS: usize = 3;
@@ -146,7 +148,7 @@ impl Scene {
         let best_of = |backgrounds: &[usize]| {
             let compared = backgrounds.iter().map(|&at| self.compare(at, frame));
             compared
-                .filter(|(_, share)| *share <= 0.5)
+                .filter(|(_, share)| *share <= MAX_DIFFERING_SHARE)
                 .min_by(|a, b| a.1.total_cmp(&b.1))
         };
         let others = (0..self.backgrounds.len()).filter(|at| !tried.contains(at));

@@ -15,8 +15,8 @@ use crate::order;
 
 /// Least share of the samples in which the animal must be found, 0..=1. Free choice.
 const MIN_FOUND_SHARE: f64 = 0.05;
-/// Share of the samples, 0..=1. The scene moves if in more of them other things than the animal exceed `MAX_AREA_SHARE`. A second animal must
-/// appear in more of them. Free choice.
+/// Share of the samples, 0..=1. The scene moves if other things than the animal exceed `MAX_AREA_SHARE` in more of
+/// them. A second animal must appear in more of them. Free choice.
 const FREQUENT_SHARE: f64 = 0.3;
 /// Largest median area of the animal, and of all other things together, as a share of the picture; a larger one
 /// hides too much of the background. The limit also refuses moving bedding that is mistaken for the animal.

@@ -21,6 +21,8 @@ use crate::raster::Frame;
 
 /// Largest number of samples: one bit each in a 64-bit word.
 pub(super) const MAX_SAMPLES: usize = 64;
+/// Number of frames compared to detect uneven light. Free choice.
+const N_LIGHT_FRAMES: u32 = 16;
 /// Least number of samples that agree on what a place shows. With three, one outlier is outvoted.
 pub(super) const MIN_AGREEING: usize = 3;
 
@@ -119,7 +121,7 @@ impl Samples {
     /// Divides the samples of `group` by their light relative to a background. Sets `uneven_light` of the
     /// background.
     pub(super) fn equalize_light(&mut self, group: u64, background: &mut Background) {
-        let step = group.count_ones().div_ceil(MIN_FRAMES as u32).max(1) as usize;
+        let step = group.count_ones().div_ceil(N_LIGHT_FRAMES).max(1) as usize;
         let members = indices(group).step_by(step).map(|k| &self.frames[k]);
         let compared: Vec<&Frame> = members.collect();
         background.uneven_light = light::is_uneven(&compared, background);

@@ -16,11 +16,13 @@ use super::super::kernel::{Tile, Wanted, sad_tile};
 use super::Side;
 use super::bounds::{Bounds, SpriteSums};
 use super::rotation::Canvas;
-use crate::analysis::memory::BUDGET_BYTES;
 use crate::analysis::params::Planes;
 use crate::cpu::Level;
 use crate::library::{Poses, Sprites, View};
 use crate::scratch::{Full, Scratch};
+
+/// Size of the blocks that stay in memory, bytes. The rest goes to the temporary storage. Free choice.
+const MEMORY_BYTES: usize = 64 << 20;
 
 /// The U of all frames.
 pub struct ComparedSprites {
@@ -47,7 +49,7 @@ impl ComparedSprites {
     /// Missing sprites are blank. In top view, sprites of unknown heading are blank too. Fails when the
     /// temporary storage is full.
     pub fn new(sprites: &Sprites, poses: &Poses, planes: Planes) -> Result<Self, Full> {
-        ComparedSprites::with_memory(BUDGET_BYTES, sprites, poses, planes)
+        ComparedSprites::with_memory(MEMORY_BYTES, sprites, poses, planes)
     }
 
     /// Works like `new`, but keeps at most `memory_bytes` of blocks in memory.
