@@ -9,17 +9,17 @@ use crate::analysis::silhouette::Difference;
 use crate::raster::Mask;
 
 /// Deviation of a frame from its background beside the noise of the pixel, such as that of a codec around a
-/// moving animal, levels of 255. Free choice; 3 to 5 gives the same.
+/// moving animal, levels of 255. Free choice.
 const CODEC_NOISE: f32 = 3.0;
-/// Least brightness of a shadow as a share of the background's. Free choice; a lamp leaves about as much.
+/// Least brightness of a shadow as a share of the background's. Free choice.
 const MIN_SHADOW: f32 = 0.3;
 /// Share of the scene near an animal that lies in shadow. Free choice.
 const SHADOW_SHARE: f32 = 0.1;
-/// Share of the scene near an animal that moved. Free choice; more takes gray feathers for a gray cage.
+/// Share of the scene near an animal that moved. Free choice.
 const MOVED_SHARE: f32 = 0.01;
 
-/// Density of the animal's colors, relative to even colors, until they are learned. Free choice; without it, a
-/// gray animal before a gray floor loses all that a shadow may explain, and with more, shadows are learned.
+/// Density of the animal's colors, relative to even colors, until they are learned. Free choice: a
+/// balance between gray animals, which a shadow may explain, and shadows, which are no animal.
 const COAT_DENSITY: f32 = 20.0;
 
 /// Colors of the animal and of the scene around it.

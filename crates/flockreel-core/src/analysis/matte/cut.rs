@@ -15,8 +15,8 @@ use crate::raster::runs::components;
 
 /// Largest log-likelihood of a pixel; one color does not decide. Free choice.
 const MAX_ODDS: f32 = 6.0;
-/// Log-odds that a pixel shows the animal within the silhouette, and that it does not beyond. Free choice; 2
-/// keeps shadows.
+/// Log-odds that a pixel shows the animal within the silhouette, and that it does not beyond. Free
+/// choice.
 const SILHOUETTE_ODDS: f32 = 1.0;
 /// Cost of two neighbors on two sides where the frame is even. Free choice.
 const SMOOTHNESS: f32 = 1.5;

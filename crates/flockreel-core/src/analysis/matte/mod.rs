@@ -234,10 +234,8 @@ impl MattePuller<'_> {
         let alpha = self
             .alpha_by_color(color, k)
             .unwrap_or_else(|| self.alpha_without_contrast(k));
-        let alpha = match self.thin_part_color(k) {
-            Some(body) => self.alpha_of_thin_part(alpha, body, k),
-            _ => alpha,
-        };
+        let thin = self.thin_part_color(k);
+        let alpha = thin.map_or(alpha, |body| self.alpha_of_thin_part(alpha, body, k));
         let level = (alpha * 255.0 + 0.5) as u8;
         if level == 0 {
             return [0; 4];

@@ -21,9 +21,8 @@ pub(super) fn that_whole(has_still_part: bool) -> f64 {
     if has_still_part { WITH_STILL_PART } else { 1.0 }
 }
 
-/// Fall of the log-odds with the logarithm of the extent, where no point of the outline is an edge. Measured on 30
-/// kinds of films (`bench/kinds.py`, `bench/cases.py`): frames that are sure and far off fall to a quarter, those
-/// that are sure and right by 1 %.
+/// Fall of the log-odds with the logarithm of the extent, where no point of the outline is an edge. Free
+/// choice.
 const EXTENT: f64 = 12.0;
 
 /// Returns the probability of a sighting whose area is `share` of the usual one and whose outline lies on edges in

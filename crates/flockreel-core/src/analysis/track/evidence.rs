@@ -22,13 +22,16 @@ const EDGE_SHARE: f64 = 0.35;
 const MIN_EDGE: f64 = 8.0;
 
 /// Returns the share of the outline of a silhouette that lies on edges of the frame which the background does not
-/// have, 0..=1; `None` where no point has two sides in the picture.
+/// have, 0..=1; `None` where no point has two sides in the picture, and where a mask is given.
 pub(super) fn edge_share(
     frame: &Frame,
     background: &Background,
     light: &Light,
     solid: &Mask,
 ) -> Option<f64> {
+    if frame.mask.is_some() {
+        return None;
+    }
     let rect = solid.rect.inflated(MARGIN_PX, frame.width, frame.height);
     let seen = silhouette::difference(frame, background, light, rect).rgb;
     let mut mask = Mask::new(rect);
@@ -139,7 +142,7 @@ mod tests {
     use super::*;
     use crate::geometry::Rect;
     use crate::random;
-    use crate::raster::ColorSpec;
+    use crate::raster::{ColorSpec, GivenMask};
 
     const SIZE: u32 = 80;
 
@@ -162,8 +165,12 @@ mod tests {
         libm::hypot(dx, dy) < 20.0
     }
 
-    /// Returns the edge share of the pixels of the disc left of `right`.
     fn share_of(frame: &Frame, background: &Frame, right: u32) -> f64 {
+        examined(frame, background, right).expect("it has an outline")
+    }
+
+    /// Returns the edge share of the pixels of the disc left of `right`.
+    fn examined(frame: &Frame, background: &Frame, right: u32) -> Option<f64> {
         let mut mask = Mask::new(Rect::of_size(SIZE, SIZE));
         for (at, bit) in (0..).zip(&mut mask.bits) {
             let (x, y) = (at % SIZE, at / SIZE);
@@ -171,7 +178,7 @@ mod tests {
         }
         let n_px = (SIZE * SIZE) as usize;
         let background = Background::new(background.clone(), vec![1.5; n_px], 18);
-        edge_share(frame, &background, &Light::NEUTRAL, &mask).expect("it has an outline")
+        edge_share(frame, &background, &Light::NEUTRAL, &mask)
     }
 
     #[test]
@@ -179,6 +186,13 @@ mod tests {
         let (frame, empty) = (scene(1.0), scene(0.0));
         assert!(share_of(&frame, &empty, SIZE) > 0.95);
         assert!(share_of(&frame, &empty, 40) < 0.7);
+    }
+
+    #[test]
+    fn given_mask_is_not_examined() {
+        let mask = Some(GivenMask::default());
+        let frame = Frame { mask, ..scene(1.0) };
+        assert_eq!(examined(&frame, &scene(0.0), SIZE), None);
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::stretch::Stretch;
 
 /// Number of later stretches that may continue one. Free choice: it bounds the memory.
 const N_NEXT: usize = 64;
-/// Rounds of belief propagation. Free choice: more change nothing.
+/// Rounds of belief propagation. Free choice: it bounds the time.
 const N_ROUNDS: usize = 20;
 
 /// A stretch that may continue another.

@@ -147,8 +147,8 @@ pub fn follow(
     let chosen = path::choose(&candidates, &scene.subject, follow, pin);
     let chosen = examined(chosen, &candidates);
     let movers = results.iter().zip(&chosen).map(|(result, &chosen)| {
-        let rect = chosen.map(|(at, _)| result.candidates[at].sighting.rect);
-        movers::outside_animal(&result.movers, rect)
+        let box_px = chosen.map(|(at, _)| result.candidates[at].look.box_px);
+        movers::outside_animal(&result.movers, box_px)
     });
     let times_s: Vec<f64> = results.iter().map(|r| r.time_s).collect();
     let movers = movers::gather(&movers.collect::<Vec<_>>(), &times_s);

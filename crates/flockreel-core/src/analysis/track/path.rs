@@ -280,6 +280,25 @@ mod tests {
     }
 
     #[test]
+    fn larger_thing_that_is_seen_seldom_is_not_the_largest_body() {
+        let frames: Vec<Vec<Candidate>> = (0..100)
+            .map(|t| {
+                let animal = body([100.0 + f64::from(t), 50.0], 200.0, 0.0);
+                let web = body([300.0, 80.0], 300.0, 0.5);
+                match t {
+                    50..55 => vec![animal, web],
+                    _ => vec![animal],
+                }
+            })
+            .collect();
+        let path = followed(&frames, Follow::Largest, None);
+        assert!(
+            path.iter()
+                .all(|found| found.is_some_and(|(at, _)| at == 0))
+        );
+    }
+
+    #[test]
     fn another_body_is_not_taken_for_one_that_left() {
         // The first leaves at frame 40; the other is hidden for five frames then.
         let frames: Vec<Vec<Candidate>> = (0..80)
