@@ -38,6 +38,9 @@ pub struct Individual {
     pub size: f64,
     /// State of motion of the animal in the source frame. Empty in files of schema 1.
     pub state: Vec<MotionState>,
+    /// Whether something carries the animal in the source frame. Empty from above, where the floor may, and in
+    /// older files.
+    pub carried: Vec<bool>,
     /// Cost of the plan.
     pub cost: PlanCost,
 }
@@ -106,8 +109,11 @@ pub struct PlanCost {
     /// Cost of jumps back to what was just shown.
     pub repetition: f64,
     /// Lower bound of the total of any plan, with or without the crowd cost. For a flock planned in segments,
-    /// the sum of their bounds.
+    /// the sum of their bounds. 0 for a plan that is not exact.
     pub lower_bound: f64,
+    /// Whether no cheaper plan exists. Plans with `position: film` also weigh places, which are not part of
+    /// the total.
+    pub exact: bool,
 }
 
 impl BoidTrack {
@@ -170,7 +176,9 @@ impl Individual {
             boid.speed_bl_per_s.len(),
         ];
         lengths.iter().all(|&length| length == n_frames)
-            && [0, n_frames].contains(&self.state.len())
+            && [&self.state.len(), &self.carried.len()]
+                .iter()
+                .all(|&&n| [0, n_frames].contains(&n))
             && self.fades.iter().all(|fade| {
                 let n = fade.weight.len();
                 let lengths = [&fade.rotation_rad, &fade.scale].map(Vec::len);

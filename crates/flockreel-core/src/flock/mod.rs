@@ -21,6 +21,7 @@ pub mod plan;
 pub mod quality;
 mod rotation;
 pub mod space;
+mod support;
 #[cfg(test)]
 pub(crate) mod synthetic;
 
@@ -36,16 +37,16 @@ use self::boids::Boids;
 use self::boids::calibration::Calibration;
 use self::boids::tank::Tank;
 use self::course::Course;
-use self::follow::avoidance::CLEARANCE_BL;
-use self::follow::resting_places::RestingPlaces;
+use self::follow::places::CLEAR_BL;
 use self::individual::MotionState;
 use self::lens::Lens;
 use self::motion::motion_of;
 use self::params::{MOST_BY_DEFAULT, MatchBy, Position};
 use self::placement::{Placed, Placer};
 use self::plan::{Model, Plan, Planner};
+use self::support::Support;
 use crate::geometry::rounded;
-use crate::library::Library;
+use crate::library::{Library, View};
 use crate::parameters::Parameters;
 use crate::progress::{CancelOnly, Progress};
 
@@ -106,13 +107,26 @@ pub fn plan_flock(
     if library.playback.component.is_empty() || library.playback.jumps.is_empty() {
         return Err(Error::NoTransitions);
     }
-    let lens = Lens::new(library, params);
-    let mut params = resolved(params, &lens);
+    let mut params = params.clone();
+    let is_film = params.position == Position::Film && !params.is_loop;
+    let is_carried = is_film && Support::new(library, &Lens::new(library, &params)).is_some();
+    if is_carried {
+        // What carries the animal is not mirrored, and has a depth of its own.
+        params.mirror = false;
+        params.depth_bl = params.depth_bl.or(Some(0.0));
+    }
+    let lives_alone = is_carried || is_film && library.poses.view == View::Top;
+    let sociality = &mut params.rules.sociality;
+    *sociality = sociality.or(Some(if lives_alone { 0.0 } else { 1.0 }));
+    let lens = Lens::new(library, &params);
+    let mut params = resolved(&params, &lens);
     let motion = motion_of(library, &lens);
     let tank = Tank::from_library(library, &lens, &motion, &params);
-    let resting_places = RestingPlaces::new(library, &motion, &lens);
-    let n_resting = resting_places.capacity(CLEARANCE_BL * lens.length_px);
-    let room_for = tank.capacity().min(n_resting.unwrap_or(u32::MAX));
+    let support = Support::new(library, &lens).filter(|_| is_carried);
+    let n_carried = support
+        .as_ref()
+        .map(|support| support.capacity(CLEAR_BL * lens.length_px));
+    let room_for = tank.capacity().min(n_carried.unwrap_or(u32::MAX));
     params.count = params.count.or(Some(room_for.clamp(2, MOST_BY_DEFAULT)));
     let params = &params;
     let calibration = Calibration::from_library(library, &motion, lens.is_flat()).in_tank(&tank);
@@ -129,7 +143,7 @@ pub fn plan_flock(
             calibration: &calibration,
         };
         match params.position {
-            Position::Film => follow::play(boids, &model, &placer, progress),
+            Position::Film => follow::play(boids, &model, &placer, support.as_ref(), progress),
             Position::Leash | Position::Boid | Position::Papers => {
                 play_whole(boids, &model, &placer, progress)
             }
@@ -142,7 +156,16 @@ pub fn plan_flock(
     })?;
     let mut played = play(&spaced, progress)?;
     let states = motion::states(library, &motion);
-    let individuals = individuals(&model, &mut played, &states);
+    let mut individuals = individuals(&model, &mut played, &states);
+    if let Some(support) = &support {
+        for one in &mut individuals {
+            let frames = one.source_frame.iter();
+            one.carried = frames
+                .map(|&frame| support.foot_px(frame).is_some())
+                .collect();
+        }
+    }
+    let n_steps = individuals.len() * params.frames as usize;
     let course = played.course;
     Ok(Flock {
         fps,
@@ -151,6 +174,7 @@ pub fn plan_flock(
         space: Space::new(&lens, &tank),
         stats: Stats {
             room_for,
+            clipped_share: rounded(played.n_clipped as f64 / n_steps as f64, 4),
             ..measured(&individuals, &course.orders, library, params, &tank)
         },
         orders: course.orders,
@@ -185,6 +209,8 @@ struct Played {
     course: Course,
     plans: Vec<Plan>,
     placed: Vec<Placed>,
+    /// Number of steps that ended at a wall.
+    n_clipped: usize,
 }
 
 /// Simulates the whole video, then plans and places it.
@@ -212,6 +238,7 @@ fn play_whole(
         course,
         plans,
         placed,
+        n_clipped: 0,
     })
 }
 
@@ -254,6 +281,7 @@ fn individuals(model: &Model, played: &mut Played, states: &[MotionState]) -> Ve
                 scale: placed.scale,
                 size: placed.size,
                 state: (shown.iter().map(|shown| states[shown.0 as usize])).collect(),
+                carried: Vec::new(),
                 depth_m: placed.depth_m,
                 boid: boid.clone(),
                 cost: plan.cost.in_radians(),

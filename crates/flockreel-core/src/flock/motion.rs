@@ -17,7 +17,7 @@ const MIN_LEVEL: f64 = 0.5;
 const TURN_SPAN_S: f64 = 0.1;
 
 /// Speed below which the animal rests, body lengths per second. Free choice.
-const REST_BL_PER_S: f64 = 0.1;
+pub(super) const REST_BL_PER_S: f64 = 0.1;
 /// Speed below which the animal is slow, as a share of its usual speed. Free choice.
 const SLOW_SHARE: f64 = 0.5;
 /// Speed from which the animal darts, as a share of its usual speed. Free choice.

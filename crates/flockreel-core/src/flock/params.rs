@@ -117,7 +117,7 @@ pub struct Matching {
     #[schema(minimum = 0, maximum = 4)]
     pub w_v: f64,
     /// Cost of a jump whose distance D equals epsilon, radians. The cost is proportional to D.
-    #[default = 1.2]
+    #[default = 2.4]
     #[schema(minimum = 0, maximum = 4)]
     pub wx: f64,
     /// Cost of showing nearly the same frame as a neighbor, radians at distance 0. The cost falls with
@@ -235,15 +235,19 @@ impl Parameters for Params {
     const PRESETS: &'static [&'static str] =
         &["school", "swarm", "mill", "scatter", "zonal", "papers"];
 
-    /// `school` has all defaults.
+    /// `school` has all defaults, but `sociality` 1.
     fn preset(name: &str) -> Option<Params> {
         let with_rules = |rules| Params {
             rules,
             ..Params::default()
         };
         match name {
-            "school" => Some(Params::default()),
+            "school" => Some(with_rules(Rules {
+                sociality: Some(1.0),
+                ..Rules::default()
+            })),
             "swarm" => Some(with_rules(Rules {
+                sociality: Some(1.0),
                 alignment: 0.0,
                 // With more cohesion, boids in a narrow tank swim back and forth together.
                 cohesion: 0.4,

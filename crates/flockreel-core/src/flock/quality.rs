@@ -46,6 +46,8 @@ pub struct Stats {
     pub distinct_looks: u32,
     /// Number of individuals that the tank has room for. In a larger flock some overlap. 0 = unknown.
     pub room_for: u32,
+    /// Share of the steps that ended at a wall, so that an animal moved less than the filmed one, 0..=1.
+    pub clipped_share: f64,
     /// Share of the component's frames that are shown.
     pub variety: f64,
     /// Polarization, mean over the frames, 0..=1.
@@ -74,7 +76,7 @@ pub struct Stats {
     pub overlap_violations: u64,
 }
 
-/// Returns the measures of a flock, rounded as in files. `room_for`, `spacing_bl`, `crossings_per_min`,
+/// Returns the measures of a flock, rounded as in files. `room_for`, `clipped_share`, `spacing_bl`, `crossings_per_min`,
 /// `visible_share` and `overlap_bl` are 0.
 pub fn measure(
     individuals: &[Individual],

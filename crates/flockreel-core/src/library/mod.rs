@@ -15,6 +15,9 @@ pub use sprites::{Matte, Sprites};
 use crate::geometry::Rect;
 use crate::raster::{RgbImage, RgbaImage};
 
+/// Confidence above which a frame surely shows the animal. Free choice.
+const SURE: f64 = 0.9;
+
 /// The result of one analysis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Library {
@@ -44,6 +47,25 @@ pub struct Library {
     pub patches: Vec<Patch>,
     /// Statistics of this library.
     pub stats: LibraryStats,
+}
+
+impl Library {
+    /// Returns the centroids of the frames in which the whole animal was surely seen, pixels. Frames that
+    /// playback may show always count.
+    pub fn places_px(&self) -> impl Iterator<Item = [f64; 2]> {
+        let is_shown = |frame: usize| {
+            self.playback
+                .component
+                .binary_search(&(frame as u32))
+                .is_ok()
+        };
+        let frames = self.poses.frames.iter().enumerate();
+        frames
+            .filter(move |(frame, pose)| {
+                (pose.confidence.is_some_and(|p| p > SURE) && !pose.cut) || is_shown(*frame)
+            })
+            .filter_map(|(_, pose)| pose.centroid_px)
+    }
 }
 
 /// The shadow of an animal on the floor below it: the animal's outline, shifted and blurred.

@@ -97,7 +97,7 @@ impl<'a> Boids<'a> {
         let step_s = 1.0 / (fps * f64::from(n_substeps));
         let mut boids = Boids {
             params: Params {
-                rules: params.rules.closer(tank.radius_scale(n)),
+                rules: params.rules.closer(tank.radius_scale(n)).social(),
                 ..params.clone()
             },
             habitat: Habitat::new(params, lens, tank),

@@ -17,6 +17,10 @@ pub struct Rules {
     #[default = 1.5]
     #[schema(minimum = 0, maximum = 20)]
     pub separation: f64,
+    /// Share of `alignment` and `cohesion` that applies. null = with `position: film` 0 for an animal that is
+    /// carried by a perch or a floor, as all are from above, and 1 for one that swims or flies.
+    #[schema(minimum = 0, maximum = 1)]
+    pub sociality: Option<f64>,
     /// Weight of alignment: boids match the velocity of their neighbors.
     #[default = 2.0]
     #[schema(minimum = 0, maximum = 20)]
@@ -204,6 +208,16 @@ impl Rules {
             *radius_bl *= share;
         }
         rules
+    }
+
+    /// Returns the rules with the weights that `sociality` leaves.
+    pub fn social(self) -> Rules {
+        let share = self.sociality.unwrap_or(1.0);
+        Rules {
+            alignment: share * self.alignment,
+            cohesion: share * self.cohesion,
+            ..self
+        }
     }
 }
 

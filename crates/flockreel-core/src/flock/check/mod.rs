@@ -1,7 +1,8 @@
 //! Independent check of a stored plan: `flockreel check-plan` (docs/explanation/algorithms.md, "Planning").
 //!
 //! Every step must be the next frame or a jump of the library, after the dwell. The total cost must be right,
-//! and no cheaper plan may exist. All kinds of plans are checked: whole films, segments and loops, in
+//! and no cheaper plan may exist. Plans with `position: film` also weigh places, which are not in the file, so
+//! for them only steps and costs are checked, except those of older files. All kinds of plans are checked: whole films, segments and loops, in
 //! every view, but not with `matching.by: direction`. The division of a total into its parts is not checked,
 //! only their sum.
 //!
@@ -124,11 +125,24 @@ impl<'a> Checker<'a> {
     fn check(&self, one: &Individual) -> Result<usize, Violation> {
         let (id, cost) = (one.id, &one.cost);
         let plan = self.plan(one)?;
+        if !cost.exact && self.costs.flock.params.position != Position::Film {
+            return refuse(
+                "not_cheapest",
+                format!("individual {id}: the plan is not exact"),
+            );
+        }
         let [mut total, mut lower_bound] = [0; 2];
         for ends in self.ends.windows(2) {
             let frames = ends[0]..ends[1];
             let wanted = self.costs.wanted(&one.boid.part(frames.clone()));
             let alone = wanted.iter().map(|&wanted| self.costs.row(wanted, None));
+            if !cost.exact {
+                let shown = plan[frames].iter().zip(alone);
+                total += shown
+                    .map(|(step, row)| step.jump.unwrap_or(0) + row[step.state])
+                    .sum::<u64>();
+                continue;
+            }
             lower_bound += self.least_cost(&plan, frames.start, alone);
             let [paid, future, least] = self.segment(one, &plan, frames.clone(), &wanted);
             total += paid;

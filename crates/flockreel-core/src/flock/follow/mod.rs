@@ -5,24 +5,26 @@
 //! shown last (`plan::segment`). The animal then moves by the filmed steps of the planned frames, corrected a
 //! little toward the boid (`advance`).
 
-mod advance;
-pub(super) mod avoidance;
 mod natural;
-pub(super) mod resting_places;
+pub(super) mod places;
+mod steps;
+mod walk;
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-use self::advance::Trajectory;
 use self::natural::NaturalPlayback;
-use self::resting_places::RestingPlaces;
+use self::places::{HomeRange, World};
+use self::steps::Trajectory;
+use self::walk::{Node, Other, Walk, Walker};
 use super::boids::Boids;
 use super::boids::vector::{norm, scaled};
 use super::course::{Course, steps};
-use super::placement::{Placer, PreviousFrame};
+use super::placement::Placer;
 use super::plan::segment::PlaybackStatus;
-use super::plan::{Model, Plan, Planner};
+use super::plan::{Model, Plan};
+use super::support::Support;
 use super::{Error, Played};
 use crate::library::View;
 use crate::progress::Progress;
@@ -30,6 +32,12 @@ use crate::progress::Progress;
 /// Default length of a segment, seconds. In side view a turn takes about a second and pays off only after it,
 /// so plans must look beyond it.
 const SEGMENT_S: f64 = 3.0;
+
+/// Greatest distance from the filmed places at which an individual that is carried stands, body lengths. Free
+/// choice.
+const ASIDE_BL: f64 = 0.45;
+/// Number of individuals that are planned at the same time. Free choice.
+const ROUND_SIZE: usize = 2;
 
 /// Returns the first frame of each segment, and as the last entry the number of frames.
 pub(super) fn segments(n_frames: usize, segment_frames: Option<u32>, fps: f64) -> Vec<usize> {
@@ -44,7 +52,9 @@ struct Follower<'a> {
     model: &'a Model,
     placer: &'a Placer<'a>,
     natural: NaturalPlayback<'a>,
-    resting_places: RestingPlaces,
+    n_clipped: usize,
+    home_range: HomeRange,
+    support: Option<&'a Support>,
     course: Course,
     plans: Vec<Plan>,
     trajectories: Vec<Trajectory>,
@@ -57,6 +67,7 @@ pub(super) fn play(
     mut boids: Boids,
     model: &Model,
     placer: &Placer,
+    support: Option<&Support>,
     progress: &dyn Progress,
 ) -> Result<Played, Error> {
     let (params, fps) = (placer.params, placer.library.poses.fps);
@@ -68,7 +79,9 @@ pub(super) fn play(
         model,
         placer,
         natural: NaturalPlayback::new(model, placer.motion, params.seed),
-        resting_places: RestingPlaces::new(placer.library, placer.motion, placer.lens),
+        n_clipped: 0,
+        home_range: HomeRange::new(placer.library, placer.lens),
+        support,
         course: Course::new(&boids, placer.lens),
         plans: vec![Plan::default(); n],
         trajectories: vec![Trajectory::default(); n],
@@ -88,10 +101,7 @@ pub(super) fn play(
             }
             course.record(&boids, placer.lens);
         }
-        let is_last = end == n_frames;
-        let planner = Planner::for_segment(model, &course.tracks, &follower.statuses, is_last);
-        let plans = planner.plan(progress)?;
-        follower.append(course, plans);
+        follower.append(course, first)?;
         follower.move_to_animals(&mut boids);
     }
     Ok(follower.finish())
@@ -119,30 +129,79 @@ impl Follower<'_> {
         ids.map(states).collect()
     }
 
-    /// Appends the boids and plans of a segment, and places the frames of the plans.
-    fn append(&mut self, course: Course, plans: Vec<Plan>) {
-        let model = self.model;
-        self.statuses.resize(plans.len(), PlaybackStatus::default());
-        let shown: Vec<Vec<(u32, bool)>> =
-            plans.iter().map(|plan| model.shown(&plan.states)).collect();
-        let before: Option<Vec<PreviousFrame>> = (self.plans.iter().zip(&self.trajectories))
-            .map(|(plan, trajectory)| {
-                let &state = plan.states.last()?;
-                Some(PreviousFrame {
-                    state: model.trellis.shown(state as usize)?,
-                    heading_rad: *trajectory.heading_rad.last()?,
-                    centroid_px: *trajectory.centroid_px.last()?,
-                })
-            })
+    /// Appends the boids of a segment, and the frames and places of their animals. Individuals are planned in
+    /// rounds. Each knows the walks of the rounds before, and of the others the boids.
+    fn append(&mut self, course: Course, first: usize) -> Result<(), Error> {
+        let n = self.plans.len();
+        self.statuses.resize(n, PlaybackStatus::default());
+        let goals: Vec<Vec<[f64; 2]>> = (course.tracks.iter())
+            .map(|boid| boid.position_px.iter().map(|&[x, y, _]| [x, y]).collect())
             .collect();
-        let (tracks, resting_places) = (&course.tracks, &self.resting_places);
-        let later = (self.placer).advance(&shown, tracks, before.as_deref(), resting_places);
-        for (id, (plan, later)) in plans.into_iter().zip(later).enumerate() {
-            self.statuses[id].update(&plan.states, model.dwell);
-            self.trajectories[id].append(later);
-            self.plans[id].append(plan);
+        let mut walks: Vec<Walk> = Vec::with_capacity(n);
+        while walks.len() < n {
+            let ids = walks.len()..(walks.len() + ROUND_SIZE).min(n);
+            let walk = |id: usize| {
+                let walker = self.walker(id);
+                let planned = walks.iter().map(|walk| Other {
+                    places_px: &walk.trajectory.centroid_px,
+                    states: Some(&walk.states),
+                });
+                let rest = (walks.len()..n)
+                    .filter(|other| *other != id)
+                    .map(|other| Other {
+                        places_px: &goals[other],
+                        states: None,
+                    });
+                let others: Vec<Other> = planned.chain(rest).collect();
+                let moments = walker.moments(&course.tracks[id], &others);
+                (walker.walk(self.last_node(id), &moments, first)).ok_or(Error::NoTransitions)
+            };
+            let round: Result<Vec<Walk>, Error> = ids.into_par_iter().map(walk).collect();
+            walks.extend(round?);
+        }
+        for (id, walk) in walks.into_iter().enumerate() {
+            let (wanted, before) = (
+                self.model.wanted(&course.tracks[id]),
+                self.statuses[id].state,
+            );
+            let cost = self.model.cost_of_walk(&wanted, before, &walk.states);
+            self.statuses[id].update(&walk.states, self.model.dwell);
+            self.trajectories[id].append(walk.trajectory);
+            self.n_clipped += walk.n_clipped;
+            self.plans[id].append(Plan {
+                states: walk.states,
+                cost,
+            });
         }
         self.course.append(course);
+        Ok(())
+    }
+
+    /// Returns the search for the walks of an individual.
+    fn walker(&self, id: usize) -> Walker<'_> {
+        let placer = self.placer;
+        // Fractional parts of multiples of the golden ratio are spread evenly.
+        let aside = 2.0 * (std::f64::consts::GOLDEN_RATIO * id as f64).fract() - 1.0;
+        let world = World {
+            placer,
+            home_range: &self.home_range,
+            support: self.support,
+            aside_px: ASIDE_BL * placer.lens.length_px * aside,
+            radius_scale: placer.tank.radius_scale(self.plans.len()),
+        };
+        Walker::new(self.model, world, placer.size(id))
+    }
+
+    /// Returns the frame and place that an individual showed last.
+    fn last_node(&self, id: usize) -> Option<Node> {
+        let status = self.statuses[id];
+        let since = self.model.dwell - status.n_forced.min(self.model.dwell - 1);
+        let trajectory = &self.trajectories[id];
+        let (&heading, &place) = trajectory
+            .heading_rad
+            .last()
+            .zip(trajectory.centroid_px.last())?;
+        Some(Node::new(status.state?, since, heading, place))
     }
 
     /// Moves each boid to the position of its animal. In top view the boid also takes the heading of its
@@ -181,6 +240,7 @@ impl Follower<'_> {
             course: self.course,
             plans: self.plans,
             placed,
+            n_clipped: self.n_clipped,
         }
     }
 }

@@ -26,8 +26,6 @@ mod draw {
 pub(super) struct NaturalPlayback<'a> {
     model: &'a Model,
     seed: u64,
-    /// Target state and cost, turns, of each jump, by source state.
-    jumps: Vec<Vec<(u32, u32)>>,
     /// Speed and turn rate, by state.
     motions: Vec<ImposedMotion>,
 }
@@ -35,12 +33,6 @@ pub(super) struct NaturalPlayback<'a> {
 impl<'a> NaturalPlayback<'a> {
     pub(super) fn new(model: &'a Model, motion: &[FrameMotion], seed: u64) -> NaturalPlayback<'a> {
         let trellis = &model.trellis;
-        let mut jumps = vec![Vec::new(); trellis.n_states()];
-        for (k, &target) in trellis.targets().iter().enumerate() {
-            for &(source, cost) in trellis.sources(k) {
-                jumps[source as usize].push((target, cost));
-            }
-        }
         let motion_in = |state| {
             let Some((frame, mirrored)) = trellis.shown(state) else {
                 return ImposedMotion::default();
@@ -55,7 +47,6 @@ impl<'a> NaturalPlayback<'a> {
         NaturalPlayback {
             model,
             seed,
-            jumps,
             motions: (0..trellis.n_states()).map(motion_in).collect(),
         }
     }
@@ -64,7 +55,7 @@ impl<'a> NaturalPlayback<'a> {
     /// Random states show rest and motion in the shares of the footage. Returns `None` if playback cannot
     /// continue from any state.
     pub(super) fn first_state(&self, id: usize, cost: impl Fn(usize) -> u32) -> Option<u32> {
-        let goes_on: Vec<u32> = (0..self.jumps.len() as u32)
+        let goes_on: Vec<u32> = (0..self.motions.len() as u32)
             .filter(|&state| self.model.is_endless(state))
             .collect();
         let drawn = (0..N_START_CANDIDATES).filter_map(|k| {
@@ -104,7 +95,7 @@ impl<'a> NaturalPlayback<'a> {
     /// Returns the target of a random jump from a state, or `None` if it has no jump. Expensive jumps are
     /// rarer.
     fn jump(&self, state: u32, key: [u64; 4]) -> Option<u32> {
-        let jumps = &self.jumps[state as usize];
+        let jumps = self.model.jumps_from(state);
         let least = jumps.iter().map(|jump| jump.1).min()?;
         let share = |cost: u32| libm::exp(-f64::from(cost - least) / RARER_TURNS);
         let sum: f64 = jumps.iter().map(|jump| share(jump.1)).sum();

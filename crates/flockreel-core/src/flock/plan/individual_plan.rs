@@ -32,6 +32,8 @@ pub struct CostParts {
     pub(super) repetition: u64,
     pub(super) total: u64,
     pub(super) lower_bound: u64,
+    /// Whether the plan weighs places, so that it is not the cheapest by the parts above.
+    pub(super) weighs_places: bool,
 }
 
 impl AddAssign for CostParts {
@@ -43,6 +45,7 @@ impl AddAssign for CostParts {
         self.repetition += other.repetition;
         self.total += other.total;
         self.lower_bound += other.lower_bound;
+        self.weighs_places |= other.weighs_places;
     }
 }
 
@@ -58,6 +61,7 @@ impl CostParts {
             crowd: rad(self.crowd),
             repetition: rad(self.repetition),
             lower_bound: rad(self.lower_bound),
+            exact: !self.weighs_places,
         }
     }
 }

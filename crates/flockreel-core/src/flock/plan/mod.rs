@@ -55,6 +55,8 @@ pub struct Model {
     alike: Vec<[u32; 2]>,
     fps: f64,
     trace_pool: TracePool,
+    /// Target state and cost of each jump, in turns, by source state.
+    jumps: Vec<Vec<(u32, u32)>>,
 }
 
 impl Model {
@@ -70,6 +72,12 @@ impl Model {
         let fps = library.poses.fps;
         let length_px = library.stats.length_px.unwrap_or(1.0).max(1.0);
         let crowd = Crowd::new(params.matching.w_c, fps, length_px);
+        let mut jumps = vec![Vec::new(); trellis.n_states()];
+        for (k, &target) in trellis.targets().iter().enumerate() {
+            for &(source, cost) in trellis.sources(k) {
+                jumps[source as usize].push((target, cost));
+            }
+        }
         Model {
             features: weights.features(&trellis, motion),
             alike: crowd.alike(&trellis),
@@ -80,7 +88,70 @@ impl Model {
             weights,
             fps,
             trace_pool: TracePool::default(),
+            jumps,
         }
+    }
+
+    /// Returns the jumps from a state: target state and cost, in turns.
+    pub fn jumps_from(&self, state: u32) -> &[(u32, u32)] {
+        &self.jumps[state as usize]
+    }
+
+    /// Returns the features that a boid asks for at each frame.
+    pub fn wanted(&self, boid: &BoidTrack) -> Vec<Feature> {
+        self.weights.wanted(boid, self.fps)
+    }
+
+    /// Returns the costs of showing a state where `wanted` is asked for, in turns: heading and speed.
+    pub fn match_costs(&self, wanted: Feature, state: u32) -> [u32; 2] {
+        let [heading, speed] = (self.weights).parts_of(wanted, self.features[state as usize]);
+        let heading = heading.min(CEILING - 1);
+        [heading, speed.min(CEILING - 1 - heading)]
+    }
+
+    /// Returns the cost of showing states after the one before, without crowd cost. The states were chosen by
+    /// their places too.
+    pub fn cost_of_walk(
+        &self,
+        wanted: &[Feature],
+        before: Option<u32>,
+        states: &[u32],
+    ) -> CostParts {
+        let mut cost = CostParts {
+            weighs_places: true,
+            ..CostParts::default()
+        };
+        for (&wanted, &state) in wanted.iter().zip(states) {
+            let [heading, speed] = self.match_costs(wanted, state);
+            cost.heading += u64::from(heading);
+            cost.speed += u64::from(speed);
+        }
+        let befores = before.into_iter().chain(states.iter().copied());
+        let afters = &states[usize::from(before.is_none()).min(states.len())..];
+        for (from, &to) in befores.zip(afters).filter(|(from, to)| **to != from + 1) {
+            let repetition = self.repetition_cost(from, to);
+            cost.repetition += u64::from(repetition);
+            cost.transition += u64::from(self.trellis.jump_cost(from, to) - repetition);
+        }
+        cost.total = cost.heading + cost.speed + cost.transition + cost.repetition;
+        cost
+    }
+
+    /// Returns the future cost of a state, in turns.
+    pub fn future(&self, state: u32) -> u32 {
+        self.future[state as usize]
+    }
+
+    /// Returns whether two states look alike.
+    pub fn looks_alike(&self, state: u32, other: u32) -> bool {
+        let [first, end] = self.alike[state as usize];
+        (first..end).contains(&other)
+    }
+
+    /// Returns the cost of looking like an animal at an offset in the image, body lengths, in turns.
+    pub fn crowd_cost(&self, offset_bl: [f64; 2]) -> u32 {
+        let [x, y] = offset_bl.map(|bl| (32.0 * bl).round() as i32);
+        self.crowd.cost_at([x, y, 0], [0; 3])
     }
 
     /// Returns the frame and mirror side of each state. Barriers are left out.
@@ -278,6 +349,7 @@ impl<'a> Planner<'a> {
                 repetition: u64::from(repetition),
                 total: u64::from(path.cost),
                 lower_bound: u64::from(lower_bound),
+                weighs_places: false,
             },
         }
     }

@@ -19,7 +19,7 @@ use crate::flock::{BoidTrack, Fade, Flock, Individual, Params, PlanCost};
 use crate::parameters::Parameters;
 
 /// Name and version of the schema.
-pub const SCHEMA: &str = "flockreel/flock@2";
+pub const SCHEMA: &str = "flockreel/flock@3";
 
 /// Returns the flock as JSON, one line per individual.
 pub fn write(flock: &Flock) -> Vec<u8> {
@@ -116,6 +116,9 @@ struct IndividualFile {
     /// Absent in schema 1.
     #[serde(default)]
     state: Vec<MotionState>,
+    /// Absent before schema 3.
+    #[serde(default)]
+    carried: Vec<bool>,
     fade: Vec<FadeFile>,
     centroid_px: Vec<[f64; 2]>,
     heading_rad: Vec<f64>,
@@ -169,12 +172,8 @@ struct BoidFields {
 }
 
 #[derive(Serialize, Deserialize)]
-struct CostFile {
-    #[serde(flatten, with = "CostFields")]
-    cost: PlanCost,
-    /// Always true: the plan of each segment is optimal.
-    exact: bool,
-}
+#[serde(transparent)]
+struct CostFile(#[serde(with = "CostFields")] PlanCost);
 
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "PlanCost")]
@@ -188,6 +187,7 @@ struct CostFields {
     #[serde(default)]
     repetition: f64,
     lower_bound: f64,
+    exact: bool,
 }
 
 impl IndividualFile {
@@ -203,6 +203,7 @@ impl IndividualFile {
                 size: individual.size,
             },
             state: individual.state,
+            carried: individual.carried,
             fade: individual.fades.into_iter().map(FadeFile).collect(),
             centroid_px: individual.centroid_px,
             heading_rad: individual.heading_rad,
@@ -210,10 +211,7 @@ impl IndividualFile {
             scale: individual.scale,
             depth_m: individual.depth_m,
             boid: individual.boid,
-            cost: CostFile {
-                cost: individual.cost,
-                exact: true,
-            },
+            cost: CostFile(individual.cost),
         }
     }
 
@@ -226,6 +224,7 @@ impl IndividualFile {
             continues_as: self.continues_as,
             size: self.variation.size,
             state: self.state,
+            carried: self.carried,
             fades: self.fade.into_iter().map(|fade| fade.0).collect(),
             centroid_px: self.centroid_px,
             heading_rad: self.heading_rad,
@@ -233,7 +232,7 @@ impl IndividualFile {
             scale: self.scale,
             depth_m: self.depth_m,
             boid: self.boid,
-            cost: self.cost.cost,
+            cost: self.cost.0,
         }
     }
 }
@@ -257,7 +256,7 @@ mod tests {
         let bytes = write(&flock);
         assert_eq!(read(&bytes).unwrap(), flock);
         let head = String::from_utf8_lossy(&bytes[..60]).into_owned();
-        assert!(head.starts_with(r#"{"schema":"flockreel/flock@2","version":""#));
+        assert!(head.starts_with(r#"{"schema":"flockreel/flock@3","version":""#));
     }
 
     #[test]

@@ -53,6 +53,8 @@ struct StatsFields {
     wall_violations: u64,
     #[serde(default)]
     overlap_violations: u64,
+    #[serde(default)]
+    clipped_share: f64,
 }
 
 /// The order of every frame, one list per measure.

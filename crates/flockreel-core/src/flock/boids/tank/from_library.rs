@@ -1,4 +1,4 @@
-//! Tank of a library: the area in which the animal was seen, as far as it is wholly in the image
+//! Tank of a library: the area in which the centroid of the animal was seen
 //! (docs/explanation/algorithms.md, "Boids").
 
 use std::f64::consts::TAU;
@@ -9,7 +9,7 @@ use crate::flock::boids::vector::norm;
 use crate::flock::lens::Lens;
 use crate::flock::motion::FrameMotion;
 use crate::flock::params::{Params, TankExtent};
-use crate::library::{Library, Pose, View};
+use crate::library::{Library, View};
 use crate::order::{median, percentile};
 
 /// Number of directions in which the seen area is bounded. Free choice.
@@ -23,12 +23,13 @@ const GROWTH_BL: f64 = 0.25;
 const CLEARANCE_BL: f64 = 0.05;
 /// Least and greatest depth of a tank without a requested depth, body lengths. Free choice.
 const DEPTH_LIMITS_BL: [f64; 2] = [1.0, 6.0];
-/// Share of frames, and of bodies, that the seen region leaves out at either end. Free choice.
+/// Share of frames that the range of depths leaves out at either end. Free choice.
 const OUTLIER_SHARE: f64 = 0.01;
 
 impl Tank {
-    /// Returns the tank of a library: the area and the range of depths in which the animal was seen. If the
-    /// flock lacks space, the area grows, but only as far as the animal is wholly in the image.
+    /// Returns the tank of a library: the convex area and the range of depths in which the centroid of the
+    /// animal was seen. If the flock lacks space, the area grows, but only as far as an animal is wholly in
+    /// the image.
     pub fn from_library(
         library: &Library,
         lens: &Lens,
@@ -37,6 +38,7 @@ impl Tank {
     ) -> Tank {
         let [w, h] = library.poses.image_size_px.map(f64::from);
         let geometry = Geometry {
+            library,
             lens,
             body: Body::new(library, lens.length_px),
             size_px: [w, h],
@@ -76,6 +78,7 @@ fn widen(lines: &mut [Line], by_px: f64, max_area_px2: f64) -> bool {
 
 /// Inputs that all tanks of one library share.
 struct Geometry<'a> {
+    library: &'a Library,
     lens: &'a Lens,
     body: Body,
     size_px: [f64; 2],
@@ -93,7 +96,8 @@ impl Geometry<'_> {
             ([0.0, -1.0], 0.0),
         ];
         let edges = edges.map(|(outward, offset_px)| Line { outward, offset_px });
-        let walls = self.walls(&edges).chain(self.walls(lines)).collect();
+        let seen = lines.iter().map(|line| self.wall(*line, 0.0));
+        let walls = self.edge_walls(&edges).chain(seen).collect();
         let [near, far] = self.depths_bl;
         let places = [
             ([0.0, 0.0], near),
@@ -111,17 +115,22 @@ impl Geometry<'_> {
         Tank::cut_box(corners, walls)
     }
 
-    /// Returns the walls for lines, moved inward by the margin of a body, but by at most a third of the
-    /// distance between opposite lines. Opposite lines are half the list apart.
-    fn walls(&self, lines: &[Line]) -> impl Iterator<Item = Wall> {
+    /// Returns the walls along the edges of the image. A body keeps within the image, but its centroid may go
+    /// as far as that of the filmed animal. The margin is at most a third of the image. Opposite edges are
+    /// half the list apart.
+    fn edge_walls(&self, edges: &[Line; 4]) -> impl Iterator<Item = Wall> {
         let px_per_bl = self.lens.px_per_bl(self.depths_bl[0]);
-        (0..lines.len()).map(move |k| {
-            let Line { outward, offset_px } = lines[k];
-            let opposite_px = lines[(k + lines.len() / 2) % lines.len()].offset_px;
-            let across_bl = (offset_px + opposite_px) / px_per_bl;
-            let margin_bl = self.body.margin_bl(outward).min(across_bl / 3.0);
-            self.lens.wall(outward, offset_px, margin_bl)
+        (0..4).map(move |k| {
+            let edge = edges[k];
+            let across_bl = (edge.offset_px + edges[(k + 2) % 4].offset_px) / px_per_bl;
+            let kept_bl = (edge.offset_px - farthest_px(self.library, edge.outward)) / px_per_bl;
+            let margin_bl = self.body.margin_bl(edge.outward).min(across_bl / 3.0);
+            self.wall(edge, margin_bl.min(kept_bl))
         })
+    }
+
+    fn wall(&self, Line { outward, offset_px }: Line, margin_bl: f64) -> Wall {
+        self.lens.wall(outward, offset_px, margin_bl)
     }
 }
 
@@ -170,27 +179,25 @@ fn depths(library: &Library, lens: &Lens, motion: &[FrameMotion], params: &Param
     [nearest, nearest + depth]
 }
 
-/// Returns the outer polygon of the bodies seen; empty if there are none.
+/// Returns the outer polygon of the centroids seen; empty if there are none.
 fn seen_lines(library: &Library) -> Vec<Line> {
     let line = |k| {
         let angle = TAU * k as f64 / N_SIDES as f64;
         let outward = [libm::cos(angle), libm::sin(angle)];
-        let poses = library.poses.frames.iter();
-        let mut reaches_px: Vec<f64> = poses.filter_map(|pose| reach_px(pose, outward)).collect();
-        let offset_px = percentile(&mut reaches_px, 1.0 - OUTLIER_SHARE)?;
-        Some(Line { outward, offset_px })
+        Line {
+            outward,
+            offset_px: farthest_px(library, outward),
+        }
     };
-    (0..N_SIDES).filter_map(line).collect()
+    (0..N_SIDES).map(line).collect()
 }
 
-/// Returns how far a body reaches in a direction, pixels. The body is an ellipse of its length and height.
-fn reach_px(pose: &Pose, outward: [f64; 2]) -> Option<f64> {
-    let [x, y] = pose.centroid_px?;
-    let axis = pose.heading_rad?;
-    let (cos, sin) = (libm::cos(axis), libm::sin(axis));
-    let along = 0.5 * pose.length_px? * (outward[0] * cos + outward[1] * sin);
-    let across = 0.5 * pose.height_px? * (outward[1] * cos - outward[0] * sin);
-    Some(outward[0] * x + outward[1] * y + along.hypot(across))
+/// Returns how far the centroids seen reach in a direction, pixels from the corner of the image.
+fn farthest_px(library: &Library, outward: [f64; 2]) -> f64 {
+    library
+        .places_px()
+        .map(|[x, y]| outward[0] * x + outward[1] * y)
+        .fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Returns the area within lines of ascending angle, square pixels.

@@ -1,0 +1,436 @@
+//! Search for the frames that an individual shows in a segment, by where they lead.
+//!
+//! The place of an animal is the sum of the filmed steps of the frames shown, so frames are chosen together
+//! with their places. A beam search keeps the cheapest beginnings of a segment, frame after frame. The cost of a beginning is
+//! that of its frames and jumps, as in other plans, and that of its places (`places`). In a film with few
+//! jumps all beginnings fit into the beam, and the search is then exhaustive.
+
+use super::places::{MAX_BEYOND_BL, Place, Surroundings, World};
+use super::steps::Trajectory;
+use crate::flock::individual::BoidTrack;
+use crate::flock::placement::{Placer, is_jump};
+use crate::flock::plan::Model;
+use crate::flock::plan::cost::Feature;
+use crate::geometry::{Turns, rounded, wrap_rad};
+use crate::library::View;
+
+/// Number of beginnings kept at each frame. Free choice.
+const WIDTH: usize = 32;
+/// Side of the cells, body lengths, and number of headings to a radian, within which two beginnings that show
+/// nearly the same frame count as one. Free choices.
+const CELL_BL: f64 = 0.3;
+const HEADINGS_PER_RAD: f64 = 6.0;
+/// Number of entries of the table of cells. Two cells with the same entry count as one.
+const N_ENTRIES: usize = 1 << 10;
+/// Top view: time between two choices of the steering, seconds. Free choice.
+const STEERING_S: f64 = 0.2;
+/// Top view: cost of turning by a radian more than filmed, radians. Free choice.
+const COST_OF_STEERING: f64 = 1.0;
+/// Time after the segment within which walls still count, seconds. Free choice.
+const AHEAD_S: f64 = 0.7;
+/// Side view: largest correction of a step, as a share of its length. It stays below the quarter up to which
+/// `bench/flocks.py` counts shown and filmed speeds as equal.
+const MAX_CORRECTION_SHARE: f64 = 0.2;
+/// Side view: time constants with which place and rotation follow the boid, seconds. Free choices.
+const PULL_S: f64 = 0.5;
+const ROTATION_S: f64 = 0.15;
+/// A hovering animal has short steps although it moves. The mean speed around the frame then sets the limit
+/// of the correction, up to this speed, body lengths per second. Free choice.
+const HOVERING_BL_PER_S: f64 = 0.2;
+
+/// What an individual finds at a frame.
+pub(super) struct Moment {
+    wanted: Feature,
+    heading_rad: f64,
+    depth_bl: f64,
+    around: Surroundings,
+    /// State and distance in the image, body lengths, of each animal nearby whose frame is known.
+    shown_near: Vec<(u32, [f64; 2])>,
+}
+
+/// Frame and place of an individual.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    state: u32,
+    /// Number of frames since the last jump, at most the dwell.
+    since: u32,
+    heading_rad: f64,
+    centroid_px: [f64; 2],
+    /// Top view: whether the individual turns left (-1) or right (1) beside the filmed turns.
+    steering: i8,
+    is_clipped: bool,
+    /// Cost up to this frame, in turns.
+    cost: u64,
+    /// Index of the node before.
+    parent: u32,
+}
+
+impl Node {
+    /// Returns the node before a segment. `since` is the number of frames since the last jump.
+    pub(super) fn new(state: u32, since: usize, heading_rad: f64, centroid_px: [f64; 2]) -> Node {
+        Node {
+            state,
+            since: since as u32,
+            heading_rad,
+            centroid_px,
+            steering: 0,
+            is_clipped: false,
+            cost: 0,
+            parent: 0,
+        }
+    }
+}
+
+/// Frames and places of an individual over a segment.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Walk {
+    pub(super) states: Vec<u32>,
+    pub(super) trajectory: Trajectory,
+    /// Number of steps that ended at a wall.
+    pub(super) n_clipped: usize,
+}
+
+/// Animal beside which another one walks: its places, and its states if they are known.
+pub(super) struct Other<'a> {
+    pub(super) places_px: &'a [[f64; 2]],
+    pub(super) states: Option<&'a [u32]>,
+}
+
+/// Search for the walks of one individual.
+pub(super) struct Walker<'a> {
+    model: &'a Model,
+    world: World<'a>,
+    placer: &'a Placer<'a>,
+    /// Size of the individual relative to the filmed animal.
+    size: f64,
+    /// Shares by which place and rotation follow the boid at each frame.
+    pull: f64,
+    follow: f64,
+}
+
+impl<'a> Walker<'a> {
+    pub(super) fn new(model: &'a Model, world: World<'a>, size: f64) -> Walker<'a> {
+        let placer = world.placer;
+        let share = |time_s: f64| 1.0 - libm::exp(-1.0 / (time_s * placer.library.poses.fps));
+        Walker {
+            model,
+            world,
+            placer,
+            size,
+            pull: share(PULL_S),
+            follow: share(ROTATION_S),
+        }
+    }
+
+    /// Returns what the individual finds at each frame.
+    pub(super) fn moments(&self, boid: &BoidTrack, others: &[Other]) -> Vec<Moment> {
+        let length_px = self.placer.lens.length_px;
+        let wanted = self.model.wanted(boid).into_iter().enumerate();
+        wanted
+            .map(|(t, wanted)| {
+                let [x, y, behind_px] = boid.position_px[t];
+                let depth_bl = self.placer.depth_bl(behind_px);
+                let places = others.iter().map(|other| other.places_px[t]);
+                let shown = others.iter().filter_map(|other| {
+                    let [ox, oy] = other.places_px[t];
+                    let off_bl = [ox - x, oy - y].map(|px| px / length_px);
+                    Some((other.states?[t], off_bl))
+                });
+                Moment {
+                    wanted,
+                    heading_rad: boid.heading_rad[t],
+                    depth_bl,
+                    around: self.world.around([x, y], depth_bl, places),
+                    shown_near: shown
+                        .filter(|(_, off)| self.model.crowd_cost(*off) > 0)
+                        .collect(),
+                }
+            })
+            .collect()
+    }
+
+    /// Returns the cheapest walk found through `moments`, after the frame `start` or from any frame. `first` is
+    /// the number of the first frame. Returns `None` if playback cannot continue.
+    pub(super) fn walk(
+        &self,
+        start: Option<Node>,
+        moments: &[Moment],
+        first: usize,
+    ) -> Option<Walk> {
+        let (begun, rest) = match start {
+            Some(start) => (vec![start], moments),
+            None => (self.starts(moments.first()?), &moments[1..]),
+        };
+        let mut table = vec![u32::MAX; N_ENTRIES];
+        let mut columns: Vec<Vec<Node>> = vec![self.pruned(begun, &mut table, u32::MAX - 1)];
+        let every = ((STEERING_S * self.placer.library.poses.fps).round() as usize).max(1);
+        for (t, moment) in rest.iter().enumerate() {
+            let steers = (first + t).is_multiple_of(every);
+            let mut nodes = Vec::new();
+            for (parent, before) in columns[t].iter().enumerate() {
+                self.expand(before, parent as u32, moment, steers, &mut nodes);
+            }
+            columns.push(self.pruned(nodes, &mut table, t as u32));
+        }
+        let total = |node: &Node| {
+            node.cost + u64::from(self.model.future(node.state)) + self.cost_ahead(node, moments)
+        };
+        let last = columns.last()?;
+        let mut at = (0..last.len()).min_by_key(|&k| total(&last[k]))?;
+        let mut nodes = Vec::with_capacity(columns.len());
+        for column in columns.iter().rev() {
+            nodes.push(column[at]);
+            at = column[at].parent as usize;
+        }
+        nodes.truncate(moments.len());
+        nodes.reverse();
+        Some(Walk {
+            states: nodes.iter().map(|node| node.state).collect(),
+            trajectory: Trajectory {
+                heading_rad: nodes.iter().map(|node| node.heading_rad).collect(),
+                centroid_px: nodes.iter().map(|node| node.centroid_px).collect(),
+            },
+            n_clipped: nodes.iter().filter(|node| node.is_clipped).count(),
+        })
+    }
+
+    /// Returns the nodes with which a walk may begin: each frame from which playback can continue, at its
+    /// filmed place.
+    fn starts(&self, moment: &Moment) -> Vec<Node> {
+        let placer = self.placer;
+        let states = 0..self.model.trellis.n_states() as u32;
+        let node = |state| {
+            let shown = self.model.trellis.shown(state as usize)?;
+            let rotation = match placer.library.poses.view {
+                View::Top => 0.0,
+                View::Side => placer.rotation(shown, moment.heading_rad),
+            };
+            let heading_rad = rounded(wrap_rad(placer.source_heading(shown) + rotation), 5);
+            let scale = placer.scale(shown.0, moment.depth_bl, self.size);
+            let filmed = placer.library.poses.frames[shown.0 as usize].centroid_px?;
+            let place = self.world.home_px(shown.0, scale).unwrap_or(filmed);
+            let place = place.map(|px| rounded(px, 2));
+            let node = Node::new(state, self.model.dwell, heading_rad, place);
+            Some(self.settled(node, moment, 0))
+        };
+        let endless = states.filter(|&state| self.model.is_endless(state));
+        endless.filter_map(node).collect()
+    }
+
+    /// Adds the nodes that may follow a node.
+    fn expand(
+        &self,
+        before: &Node,
+        parent: u32,
+        moment: &Moment,
+        steers: bool,
+        nodes: &mut Vec<Node>,
+    ) {
+        let (model, dwell) = (self.model, self.model.dwell as u32);
+        let next = before.state + 1;
+        let goes_on = model.trellis.continues(before.state as usize, 1) && model.is_endless(next);
+        let on = goes_on.then_some((next, 0, (before.since + 1).min(dwell)));
+        let jumps = if before.since >= dwell {
+            model.jumps_from(before.state)
+        } else {
+            &[]
+        };
+        let jumps = jumps.iter().map(|&(state, cost)| (state, cost, 1));
+        for (state, jump, since) in on.into_iter().chain(jumps) {
+            let steerings = match self.placer.library.poses.view {
+                View::Top if steers => -1..=1,
+                View::Top | View::Side => before.steering..=before.steering,
+            };
+            for steering in steerings {
+                let node = Node {
+                    state,
+                    since,
+                    steering,
+                    parent,
+                    ..*before
+                };
+                let moved = self.moved(before, node, moment);
+                nodes.extend(moved.map(|node| self.settled(node, moment, jump)));
+            }
+        }
+    }
+
+    /// Returns `node` moved by its filmed step from `before`. `None` for a barrier.
+    fn moved(&self, before: &Node, mut node: Node, moment: &Moment) -> Option<Node> {
+        let placer = self.placer;
+        let from = self.model.trellis.shown(before.state as usize)?;
+        let to = self.model.trellis.shown(node.state as usize)?;
+        let scale = placer.scale(to.0, moment.depth_bl, self.size);
+        let is_side = placer.library.poses.view == View::Side;
+        let heading = if is_side {
+            self.followed_rad(before, from, to, moment)
+        } else {
+            before.heading_rad + placer.filmed_turn_rad(from, to) + self.steered_rad(&node, to.0)
+        };
+        node.heading_rad = rounded(wrap_rad(heading), 5);
+        let mut step = placer.shown_step_px(from, to, node.heading_rad, scale);
+        if is_jump(from, to) {
+            // A foot that stays on its ledge keeps its height.
+            let feet = self
+                .world
+                .support
+                .and_then(|support| support.foot_px(from.0).zip(support.foot_px(to.0)));
+            step[1] = feet.map_or(step[1], |(from_px, to_px)| scale * (from_px - to_px));
+        }
+        let mut place = [0, 1].map(|axis| before.centroid_px[axis] + step[axis]);
+        if is_side {
+            let correction = self.correction_px(&node, to.0, place, step, scale, moment);
+            place = [0, 1].map(|axis| place[axis] + correction[axis]);
+        }
+        let [last, beyond] =
+            [before.centroid_px, place].map(|place| moment.around.beyond_bl(place));
+        node.is_clipped = beyond > MAX_BEYOND_BL.max(last);
+        if node.is_clipped {
+            let share = ((MAX_BEYOND_BL - last) / (beyond - last)).clamp(0.0, 1.0);
+            let along = |axis: usize| {
+                before.centroid_px[axis] + share * (place[axis] - before.centroid_px[axis])
+            };
+            place = [0, 1].map(along);
+        }
+        node.centroid_px = place.map(|px| rounded(px, 2));
+        Some(node)
+    }
+
+    /// Returns the heading in side view: that of the frame, rotated smoothly toward the boid, radians.
+    fn followed_rad(
+        &self,
+        before: &Node,
+        from: (u32, bool),
+        to: (u32, bool),
+        moment: &Moment,
+    ) -> f64 {
+        let placer = self.placer;
+        let last = if is_jump(from, to) {
+            placer.rotation(to, before.heading_rad)
+        } else {
+            wrap_rad(before.heading_rad - placer.source_heading(from))
+        };
+        let wanted = placer.rotation(to, moment.heading_rad);
+        placer.source_heading(to) + last + self.follow * (wanted - last)
+    }
+
+    /// Returns the turn by steering, radians. An animal at rest is not turned.
+    fn steered_rad(&self, node: &Node, frame: u32) -> f64 {
+        let (placer, speed) = (
+            self.placer,
+            self.placer.motion[frame as usize].speed_bl_per_s,
+        );
+        let share = (speed / placer.calibration.cruise_bl_per_s).min(1.0);
+        let most_rad = placer.calibration.turn_rad_per_s / placer.library.poses.fps;
+        f64::from(node.steering) * share * most_rad
+    }
+
+    /// Returns the correction of a step in side view, pixels: toward the boid, or toward the filmed place of
+    /// an animal that is carried. Right after a jump such an animal may hop there.
+    fn correction_px(
+        &self,
+        node: &Node,
+        frame: u32,
+        place: [f64; 2],
+        step: [f64; 2],
+        scale: f64,
+        moment: &Moment,
+    ) -> [f64; 2] {
+        let placer = self.placer;
+        let px_per_frame = scale * placer.lens.length_px / placer.library.poses.fps;
+        let hovering_px = placer.speed_around(frame).min(HOVERING_BL_PER_S) * px_per_frame;
+        let mut most_px = MAX_CORRECTION_SHARE * step[0].hypot(step[1]).max(hovering_px);
+        let home = self.world.home_px(frame, scale);
+        let (goal, share) = home.map_or((moment.around.goal_px, self.pull), |home| (home, 1.0));
+        if home.is_some() && node.since <= placer.params.fade_frames {
+            most_px = placer.calibration.speed_limits_bl_per_s[1] * px_per_frame;
+        }
+        let off = [0, 1].map(|axis| share * (goal[axis] - place[axis]));
+        let share = (most_px / off[0].hypot(off[1]).max(1e-9)).min(1.0);
+        off.map(|px| share * px)
+    }
+
+    /// Returns a node with the cost of its frame and its place added.
+    fn settled(&self, node: Node, moment: &Moment, jump: u32) -> Node {
+        let model = self.model;
+        let Some((frame, _)) = model.trellis.shown(node.state as usize) else {
+            return node;
+        };
+        // Boids do not know what carries an animal, so it takes only their speed.
+        let [heading, speed] = model.match_costs(moment.wanted, node.state);
+        let heading = if self.world.support.is_some() {
+            0
+        } else {
+            heading
+        };
+        let alike = moment
+            .shown_near
+            .iter()
+            .filter(|(state, _)| model.looks_alike(*state, node.state));
+        let alike: u32 = alike.map(|&(_, off_bl)| model.crowd_cost(off_bl)).sum();
+        let place = Place {
+            frame,
+            centroid_px: node.centroid_px,
+            scale: self.placer.scale(frame, moment.depth_bl, self.size),
+        };
+        let steered_rad = self.steered_rad(&node, frame).abs();
+        let rad = self.world.cost(place, &moment.around) + COST_OF_STEERING * steered_rad;
+        let turns = heading + speed + jump + alike;
+        Node {
+            cost: node.cost + u64::from(turns) + (rad * Turns::PER_RAD) as u64,
+            ..node
+        }
+    }
+
+    /// Returns the cost of where a walk would go on after its last frame, in turns.
+    fn cost_ahead(&self, node: &Node, moments: &[Moment]) -> u64 {
+        let shown = self.model.trellis.shown(node.state as usize);
+        let Some((moment, (frame, is_mirrored))) = moments.last().zip(shown) else {
+            return 0;
+        };
+        let scale = self.placer.scale(frame, moment.depth_bl, self.size);
+        let speed = scale * self.placer.motion[frame as usize].speed_bl_per_s;
+        let ahead_px = AHEAD_S * speed * self.placer.lens.length_px;
+        let along = [libm::cos(node.heading_rad), libm::sin(node.heading_rad)];
+        let centroid_px = node.centroid_px;
+        let place = Place {
+            frame,
+            centroid_px,
+            scale,
+        };
+        let rad = self.world.cost_ahead(
+            place,
+            is_mirrored,
+            along.map(|part| ahead_px * part),
+            &moment.around,
+        );
+        (0.5 * AHEAD_S * self.placer.library.poses.fps * rad * Turns::PER_RAD) as u64
+    }
+
+    /// Returns the cheapest nodes that differ in frame, place or heading, cheapest first. `table` remembers
+    /// cells by `stamp`, which must differ at each call.
+    fn pruned(&self, mut nodes: Vec<Node>, table: &mut [u32], stamp: u32) -> Vec<Node> {
+        nodes.sort_unstable_by_key(|node| (node.cost, node.state, node.parent, node.steering));
+        let cell_px = CELL_BL * self.placer.lens.length_px;
+        let mut n_kept = 0;
+        nodes.retain(|node| {
+            if n_kept == WIDTH {
+                return false;
+            }
+            let [x, y] = node.centroid_px.map(|px| (px / cell_px).floor() as i64);
+            let heading = (node.heading_rad * HEADINGS_PER_RAD).floor() as i64;
+            let parts = [i64::from(node.state / 2), x, y, heading];
+            let hash = parts.iter().fold(0u64, |hash, &part| {
+                (hash ^ part as u64)
+                    .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+                    .rotate_left(29)
+            });
+            let entry = &mut table[hash as usize % N_ENTRIES];
+            let is_new = *entry != stamp;
+            *entry = stamp;
+            n_kept += usize::from(is_new);
+            is_new
+        });
+        nodes
+    }
+}
