@@ -53,6 +53,7 @@ impl Library {
     /// Returns the centroids of the frames in which the whole animal was surely seen, pixels. Frames that
     /// playback may show always count.
     pub fn places_px(&self) -> impl Iterator<Item = [f64; 2]> {
+        let size = self.poses.image_size_px.map(f64::from);
         let is_shown = |frame: usize| {
             self.playback
                 .component
@@ -65,6 +66,7 @@ impl Library {
                 (pose.confidence.is_some_and(|p| p > SURE) && !pose.cut) || is_shown(*frame)
             })
             .filter_map(|(_, pose)| pose.centroid_px)
+            .filter(move |place| (0..2).all(|k| (0.0..=size[k]).contains(&place[k])))
     }
 }
 

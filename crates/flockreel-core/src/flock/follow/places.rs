@@ -56,7 +56,7 @@ impl HomeRange {
         let [width, height] = library.poses.image_size_px.map(cells);
         let reach = 3.0 * KERNEL_BL / CELL_BL;
         let around = |at: f64, n: usize| {
-            let first = (at - reach).max(0.0) as usize;
+            let first = ((at - reach).max(0.0) as usize).min(n);
             first..((at + reach) as usize + 1).clamp(first, n)
         };
         let mut density = vec![0.0f64; width * height];
@@ -190,19 +190,13 @@ impl World<'_> {
 
     /// Returns the cost of a frame in the air or beyond the walls in which an individual would end, if it
     /// went on for `ahead_s` after a place, radians.
-    pub(super) fn cost_ahead(
-        &self,
-        end: Place,
-        is_mirrored: bool,
-        ahead_px: [f64; 2],
-        around: &Surroundings,
-    ) -> f64 {
+    pub(super) fn cost_ahead(&self, end: Place, ahead_px: [f64; 2], around: &Surroundings) -> f64 {
         let Some(support) = self.support else {
             let place = [0, 1].map(|k| end.centroid_px[k] + ahead_px[k]);
             return COST_BEYOND * around.beyond_bl(place).max(0.0);
         };
         let frames = &self.placer.library.poses.frames;
-        let landing = support.landing(end.frame).filter(|_| !is_mirrored);
+        let landing = support.landing(end.frame);
         let landed = landing.and_then(|frame| {
             let [from, to] = [end.frame, frame].map(|frame| frames[frame as usize].centroid_px);
             let (from, to) = from.zip(to)?;

@@ -27,7 +27,7 @@ const STEERING_S: f64 = 0.2;
 /// Top view: cost of turning by a radian more than filmed, radians. Free choice.
 const COST_OF_STEERING: f64 = 1.0;
 /// Time after the segment within which walls still count, seconds. Free choice.
-const AHEAD_S: f64 = 0.7;
+const AHEAD_S: f64 = 0.8;
 /// Side view: largest correction of a step, as a share of its length. It stays below the quarter up to which
 /// `bench/flocks.py` counts shown and filmed speeds as equal.
 const MAX_CORRECTION_SHARE: f64 = 0.2;
@@ -59,8 +59,9 @@ pub(super) struct Node {
     /// Top view: whether the individual turns left (-1) or right (1) beside the filmed turns.
     steering: i8,
     is_clipped: bool,
-    /// Cost up to this frame, in turns.
+    /// Cost up to this frame, and of what lies ahead, in turns.
     cost: u64,
+    ahead: u64,
     /// Index of the node before.
     parent: u32,
 }
@@ -76,6 +77,7 @@ impl Node {
             steering: 0,
             is_clipped: false,
             cost: 0,
+            ahead: 0,
             parent: 0,
         }
     }
@@ -103,6 +105,8 @@ pub(super) struct Walker<'a> {
     placer: &'a Placer<'a>,
     /// Size of the individual relative to the filmed animal.
     size: f64,
+    /// Top view: cost of a frame for each radian between the headings of the individual and its boid.
+    course_weight: f64,
     /// Shares by which place and rotation follow the boid at each frame.
     pull: f64,
     follow: f64,
@@ -112,10 +116,16 @@ impl<'a> Walker<'a> {
     pub(super) fn new(model: &'a Model, world: World<'a>, size: f64) -> Walker<'a> {
         let placer = world.placer;
         let share = |time_s: f64| 1.0 - libm::exp(-1.0 / (time_s * placer.library.poses.fps));
+        let params = placer.params;
+        let course_weight = match placer.library.poses.view {
+            View::Top => params.rules.sociality.unwrap_or(1.0) * params.matching.w_h,
+            View::Side => 0.0,
+        };
         Walker {
             model,
             world,
             placer,
+            course_weight,
             size,
             pull: share(PULL_S),
             follow: share(ROTATION_S),
@@ -172,11 +182,8 @@ impl<'a> Walker<'a> {
             }
             columns.push(self.pruned(nodes, &mut table, t as u32));
         }
-        let total = |node: &Node| {
-            node.cost + u64::from(self.model.future(node.state)) + self.cost_ahead(node, moments)
-        };
         let last = columns.last()?;
-        let mut at = (0..last.len()).min_by_key(|&k| total(&last[k]))?;
+        let mut at = (0..last.len()).min_by_key(|&k| last[k].cost + last[k].ahead)?;
         let mut nodes = Vec::with_capacity(columns.len());
         for column in columns.iter().rev() {
             nodes.push(column[at]);
@@ -194,21 +201,26 @@ impl<'a> Walker<'a> {
         })
     }
 
-    /// Returns the nodes with which a walk may begin: each frame from which playback can continue, at its
-    /// filmed place.
+    /// Returns the nodes with which a walk may begin: each frame from which playback can continue. It begins
+    /// at its boid in a school that has room to form, else at the filmed place.
     fn starts(&self, moment: &Moment) -> Vec<Node> {
         let placer = self.placer;
+        let is_social = placer.params.rules.sociality != Some(0.0);
+        let forms = is_social && self.world.radius_scale >= 1.0;
         let states = 0..self.model.trellis.n_states() as u32;
         let node = |state| {
             let shown = self.model.trellis.shown(state as usize)?;
             let rotation = match placer.library.poses.view {
-                View::Top => 0.0,
-                View::Side => placer.rotation(shown, moment.heading_rad),
+                View::Top if !forms => 0.0,
+                View::Top | View::Side => placer.rotation(shown, moment.heading_rad),
             };
             let heading_rad = rounded(wrap_rad(placer.source_heading(shown) + rotation), 5);
             let scale = placer.scale(shown.0, moment.depth_bl, self.size);
-            let filmed = placer.library.poses.frames[shown.0 as usize].centroid_px?;
-            let place = self.world.home_px(shown.0, scale).unwrap_or(filmed);
+            let place = match self.world.home_px(shown.0, scale) {
+                Some(home) => home,
+                None if forms => moment.around.goal_px,
+                None => placer.library.poses.frames[shown.0 as usize].centroid_px?,
+            };
             let place = place.map(|px| rounded(px, 2));
             let node = Node::new(state, self.model.dwell, heading_rad, place);
             Some(self.settled(node, moment, 0))
@@ -374,43 +386,39 @@ impl<'a> Walker<'a> {
             scale: self.placer.scale(frame, moment.depth_bl, self.size),
         };
         let steered_rad = self.steered_rad(&node, frame).abs();
-        let rad = self.world.cost(place, &moment.around) + COST_OF_STEERING * steered_rad;
+        let rad = self.world.cost(place, &moment.around)
+            + COST_OF_STEERING * steered_rad
+            + self.course_weight * wrap_rad(node.heading_rad - moment.heading_rad).abs();
         let turns = heading + speed + jump + alike;
+        let cost = node.cost + u64::from(turns) + (rad * Turns::PER_RAD) as u64;
+        let ahead = u64::from(model.future(node.state)) + self.cost_ahead(&node, place, moment);
         Node {
-            cost: node.cost + u64::from(turns) + (rad * Turns::PER_RAD) as u64,
+            cost,
+            ahead,
             ..node
         }
     }
 
-    /// Returns the cost of where a walk would go on after its last frame, in turns.
-    fn cost_ahead(&self, node: &Node, moments: &[Moment]) -> u64 {
-        let shown = self.model.trellis.shown(node.state as usize);
-        let Some((moment, (frame, is_mirrored))) = moments.last().zip(shown) else {
-            return 0;
-        };
-        let scale = self.placer.scale(frame, moment.depth_bl, self.size);
-        let speed = scale * self.placer.motion[frame as usize].speed_bl_per_s;
-        let ahead_px = AHEAD_S * speed * self.placer.lens.length_px;
+    /// Returns the cost of where a walk would go on from a place, in turns.
+    fn cost_ahead(&self, node: &Node, place: Place, moment: &Moment) -> u64 {
+        let (placer, fps) = (self.placer, self.placer.library.poses.fps);
+        let speed = place.scale * placer.motion[place.frame as usize].speed_bl_per_s;
+        let ahead_px = AHEAD_S * speed * placer.lens.length_px;
         let along = [libm::cos(node.heading_rad), libm::sin(node.heading_rad)];
-        let centroid_px = node.centroid_px;
-        let place = Place {
-            frame,
-            centroid_px,
-            scale,
-        };
-        let rad = self.world.cost_ahead(
-            place,
-            is_mirrored,
-            along.map(|part| ahead_px * part),
-            &moment.around,
-        );
-        (0.5 * AHEAD_S * self.placer.library.poses.fps * rad * Turns::PER_RAD) as u64
+        let ahead = along.map(|part| ahead_px * part);
+        let rad = self.world.cost_ahead(place, ahead, &moment.around);
+        (0.5 * AHEAD_S * fps * rad * Turns::PER_RAD) as u64
     }
 
     /// Returns the cheapest nodes that differ in frame, place or heading, cheapest first. `table` remembers
     /// cells by `stamp`, which must differ at each call.
     fn pruned(&self, mut nodes: Vec<Node>, table: &mut [u32], stamp: u32) -> Vec<Node> {
-        nodes.sort_unstable_by_key(|node| (node.cost, node.state, node.parent, node.steering));
+        // In top view steering avoids what lies ahead.
+        let foresees = u64::from(self.placer.library.poses.view == View::Side);
+        nodes.sort_unstable_by_key(|node| {
+            let rank = node.cost + foresees * node.ahead;
+            (rank, node.state, node.parent, node.steering)
+        });
         let cell_px = CELL_BL * self.placer.lens.length_px;
         let mut n_kept = 0;
         nodes.retain(|node| {

@@ -130,6 +130,7 @@ fn plan_is_the_cheapest_and_the_jump_back_cost_reduces_repeats() {
     let mut params = Params {
         count: Some(1),
         frames: 32,
+        position: Position::Leash,
         ..Params::default()
     };
     let [mut n_again, mut n_again_for_nothing] = [0.0; 2];

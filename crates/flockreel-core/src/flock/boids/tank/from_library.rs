@@ -44,22 +44,34 @@ impl Tank {
             size_px: [w, h],
             depths_bl: depths(library, lens, motion, params),
         };
-        let mut lines = match params.tank {
+        let seen = match params.tank {
             TankExtent::Seen => seen_lines(library),
             TankExtent::Picture => Vec::new(),
         };
+        // The bodies reach beyond the centroids. What grows is the area of the bodies.
+        let margins_px: Vec<f64> = (seen.iter())
+            .map(|line| lens.length_px * geometry.body.margin_bl(line.outward))
+            .collect();
+        let moved = |line: &Line, by_px: f64| Line {
+            outward: line.outward,
+            offset_px: line.offset_px + by_px,
+        };
+        let outer = seen.iter().zip(&margins_px);
+        let mut bodies: Vec<Line> = outer.map(|(line, margin)| moved(line, *margin)).collect();
         let floor = (library.poses.view == View::Top).then(|| Floor::new(&library.background));
         let growth_px = GROWTH_BL * lens.length_px;
         loop {
+            let inner = bodies.iter().zip(&margins_px);
+            let lines: Vec<Line> = inner.map(|(line, margin)| moved(line, -margin)).collect();
             let tank = geometry.tank(&lines);
             if lines.is_empty() || tank.fits_in_plane(params.most_individuals() as usize) {
                 return tank;
             }
-            let moved = match &floor {
-                Some(floor) => floor.widen(&mut lines, growth_px),
-                None => widen(&mut lines, growth_px, MAX_IMAGE_SHARE * w * h),
+            let has_moved = match &floor {
+                Some(floor) => floor.widen(&mut bodies, growth_px),
+                None => widen(&mut bodies, growth_px, MAX_IMAGE_SHARE * w * h),
             };
-            if !moved {
+            if !has_moved {
                 return tank;
             }
         }
