@@ -63,6 +63,7 @@ fn along_its_own_path(library: &Library, first: usize, n_frames: usize) -> Flock
     let individual = Individual {
         size: 1.0,
         state: Vec::new(),
+        carried: Vec::new(),
         forward: None,
         id: 0,
         source_frame: (first as u32..(first + n_frames) as u32).collect(),

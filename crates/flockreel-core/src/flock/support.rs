@@ -154,6 +154,8 @@ fn ledges(mut footholds: Vec<[f64; 2]>, length_px: f64) -> Vec<Ledge> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flock::{Params, synthetic};
+    use crate::geometry::Rect;
 
     #[test]
     fn ledges_bridge_small_gaps_and_keep_heights_apart() {
@@ -168,5 +170,58 @@ mod tests {
                 ledge(101.0, [280.0, 320.0]),
             ]
         );
+    }
+
+    /// Returns the side-view library with feet at these heights, pixels, by frame.
+    fn with_feet(foot_px: impl Fn(usize) -> f64) -> (Library, Lens) {
+        let mut library = synthetic::library(View::Side);
+        for (frame, pose) in library.poses.frames.iter_mut().enumerate() {
+            let bottom = foot_px(frame) as u32;
+            pose.centroid_px = Some([100.0 + (frame % 50) as f64, f64::from(bottom) - 12.0]);
+            pose.box_px = Some(Rect {
+                x: 90,
+                y: bottom - 24,
+                w: 20,
+                h: 24,
+            });
+        }
+        let lens = Lens::new(&library, &Params::default());
+        (library, lens)
+    }
+
+    #[test]
+    fn a_percher_is_carried_between_its_flights_and_a_swimmer_never() {
+        // Sits for two seconds on each of two perches, and flies for one second.
+        let perch = |frame: usize| match frame % 180 {
+            t @ 0..60 => (100.0, t),
+            t @ 60..90 => (100.0 + 2.0 * (t - 60) as f64, t),
+            t @ 90..150 => (160.0, t),
+            t => (160.0 - 2.0 * (t - 150) as f64, t),
+        };
+        let (library, lens) = with_feet(|frame| perch(frame).0);
+        let support = Support::new(&library, &lens).expect("it sits most of the time");
+        assert_eq!(support.foot_px(30), Some(12.0));
+        assert_eq!(support.foot_px(75), None, "in flight");
+        assert!(
+            support
+                .landing(30)
+                .is_some_and(|frame| (85..100).contains(&frame))
+        );
+        let [dx, dy] = support.way_px([120.0, 157.0]);
+        assert!(dx == 0.0 && (dy - 3.0).abs() < 1.5, "{dx} {dy}");
+        let swimmer = with_feet(|frame| 120.0 + 40.0 * libm::sin(frame as f64 / 20.0));
+        assert!(Support::new(&swimmer.0, &swimmer.1).is_none());
+        let (mut from_above, lens) = with_feet(|_| 100.0);
+        from_above.poses.view = View::Top;
+        assert!(Support::new(&from_above, &lens).is_none());
+    }
+
+    #[test]
+    fn as_many_stand_as_ledges_have_room_for() {
+        let (library, lens) = with_feet(|_| 100.0);
+        let support = Support::new(&library, &lens).expect("it stands");
+        // 49 px of footholds, and 0.2 body lengths of 40 px beyond either end.
+        assert_eq!(support.capacity(30.0), 3);
+        assert_eq!(support.capacity(200.0), 1);
     }
 }

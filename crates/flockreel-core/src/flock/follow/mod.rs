@@ -244,3 +244,6 @@ impl Follower<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

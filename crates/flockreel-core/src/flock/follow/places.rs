@@ -235,3 +235,30 @@ impl Surroundings {
             .fold(f64::NEG_INFINITY, f64::max)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::Params;
+    use crate::flock::synthetic;
+    use crate::library::View;
+
+    #[test]
+    fn the_home_range_costs_least_where_the_animal_was() {
+        let mut library = synthetic::library(View::Top);
+        for (k, pose) in library.poses.frames.iter_mut().enumerate() {
+            // Most of the time on the left, sometimes on the right.
+            let x = if k % 10 == 0 { 260.0 } else { 60.0 };
+            pose.centroid_px = Some([x, 120.0]);
+        }
+        let lens = Lens::new(&library, &Params::default());
+        let home_range = HomeRange::new(&library, &lens);
+        let [often, seldom, never, outside] =
+            [[60.0, 120.0], [260.0, 120.0], [160.0, 30.0], [-50.0, 9e4]]
+                .map(|p| home_range.cost(p));
+        assert!(often < 0.2 * COST_OF_RARITY, "{often}");
+        let rarer = (seldom - often) / COST_OF_RARITY;
+        assert!((rarer - libm::log(9.0)).abs() < 0.3, "{rarer}");
+        assert!(never > seldom && outside >= never, "{never} {outside}");
+    }
+}

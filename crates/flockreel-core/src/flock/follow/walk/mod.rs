@@ -1,14 +1,16 @@
 //! Search for the frames that an individual shows in a segment, by where they lead.
 //!
 //! The place of an animal is the sum of the filmed steps of the frames shown, so frames are chosen together
-//! with their places. A beam search keeps the cheapest beginnings of a segment, frame after frame. The cost of a beginning is
-//! that of its frames and jumps, as in other plans, and that of its places (`places`). In a film with few
-//! jumps all beginnings fit into the beam, and the search is then exhaustive.
+//! with their places. A beam search keeps the cheapest beginnings of a segment, frame after frame. The cost of
+//! a beginning is that of its frames and jumps, as in other plans, and that of its places (`places`). In a film
+//! with few jumps all beginnings fit into the beam, and the search is then exhaustive.
 
-use super::places::{MAX_BEYOND_BL, Place, Surroundings, World};
+mod moves;
+
+use super::places::{Place, Surroundings, World};
 use super::steps::Trajectory;
 use crate::flock::individual::BoidTrack;
-use crate::flock::placement::{Placer, is_jump};
+use crate::flock::placement::Placer;
 use crate::flock::plan::Model;
 use crate::flock::plan::cost::Feature;
 use crate::geometry::{Turns, rounded, wrap_rad};
@@ -28,15 +30,9 @@ const STEERING_S: f64 = 0.2;
 const COST_OF_STEERING: f64 = 1.0;
 /// Time after the segment within which walls still count, seconds. Free choice.
 const AHEAD_S: f64 = 0.8;
-/// Side view: largest correction of a step, as a share of its length. It stays below the quarter up to which
-/// `bench/flocks.py` counts shown and filmed speeds as equal.
-const MAX_CORRECTION_SHARE: f64 = 0.2;
 /// Side view: time constants with which place and rotation follow the boid, seconds. Free choices.
 const PULL_S: f64 = 0.5;
 const ROTATION_S: f64 = 0.15;
-/// A hovering animal has short steps although it moves. The mean speed around the frame then sets the limit
-/// of the correction, up to this speed, body lengths per second. Free choice.
-const HOVERING_BL_PER_S: f64 = 0.2;
 
 /// What an individual finds at a frame.
 pub(super) struct Moment {
@@ -265,101 +261,6 @@ impl<'a> Walker<'a> {
                 nodes.extend(moved.map(|node| self.settled(node, moment, jump)));
             }
         }
-    }
-
-    /// Returns `node` moved by its filmed step from `before`. `None` for a barrier.
-    fn moved(&self, before: &Node, mut node: Node, moment: &Moment) -> Option<Node> {
-        let placer = self.placer;
-        let from = self.model.trellis.shown(before.state as usize)?;
-        let to = self.model.trellis.shown(node.state as usize)?;
-        let scale = placer.scale(to.0, moment.depth_bl, self.size);
-        let is_side = placer.library.poses.view == View::Side;
-        let heading = if is_side {
-            self.followed_rad(before, from, to, moment)
-        } else {
-            before.heading_rad + placer.filmed_turn_rad(from, to) + self.steered_rad(&node, to.0)
-        };
-        node.heading_rad = rounded(wrap_rad(heading), 5);
-        let mut step = placer.shown_step_px(from, to, node.heading_rad, scale);
-        if is_jump(from, to) {
-            // A foot that stays on its ledge keeps its height.
-            let feet = self
-                .world
-                .support
-                .and_then(|support| support.foot_px(from.0).zip(support.foot_px(to.0)));
-            step[1] = feet.map_or(step[1], |(from_px, to_px)| scale * (from_px - to_px));
-        }
-        let mut place = [0, 1].map(|axis| before.centroid_px[axis] + step[axis]);
-        if is_side {
-            let correction = self.correction_px(&node, to.0, place, step, scale, moment);
-            place = [0, 1].map(|axis| place[axis] + correction[axis]);
-        }
-        let [last, beyond] =
-            [before.centroid_px, place].map(|place| moment.around.beyond_bl(place));
-        node.is_clipped = beyond > MAX_BEYOND_BL.max(last);
-        if node.is_clipped {
-            let share = ((MAX_BEYOND_BL - last) / (beyond - last)).clamp(0.0, 1.0);
-            let along = |axis: usize| {
-                before.centroid_px[axis] + share * (place[axis] - before.centroid_px[axis])
-            };
-            place = [0, 1].map(along);
-        }
-        node.centroid_px = place.map(|px| rounded(px, 2));
-        Some(node)
-    }
-
-    /// Returns the heading in side view: that of the frame, rotated smoothly toward the boid, radians.
-    fn followed_rad(
-        &self,
-        before: &Node,
-        from: (u32, bool),
-        to: (u32, bool),
-        moment: &Moment,
-    ) -> f64 {
-        let placer = self.placer;
-        let last = if is_jump(from, to) {
-            placer.rotation(to, before.heading_rad)
-        } else {
-            wrap_rad(before.heading_rad - placer.source_heading(from))
-        };
-        let wanted = placer.rotation(to, moment.heading_rad);
-        placer.source_heading(to) + last + self.follow * (wanted - last)
-    }
-
-    /// Returns the turn by steering, radians. An animal at rest is not turned.
-    fn steered_rad(&self, node: &Node, frame: u32) -> f64 {
-        let (placer, speed) = (
-            self.placer,
-            self.placer.motion[frame as usize].speed_bl_per_s,
-        );
-        let share = (speed / placer.calibration.cruise_bl_per_s).min(1.0);
-        let most_rad = placer.calibration.turn_rad_per_s / placer.library.poses.fps;
-        f64::from(node.steering) * share * most_rad
-    }
-
-    /// Returns the correction of a step in side view, pixels: toward the boid, or toward the filmed place of
-    /// an animal that is carried. Right after a jump such an animal may hop there.
-    fn correction_px(
-        &self,
-        node: &Node,
-        frame: u32,
-        place: [f64; 2],
-        step: [f64; 2],
-        scale: f64,
-        moment: &Moment,
-    ) -> [f64; 2] {
-        let placer = self.placer;
-        let px_per_frame = scale * placer.lens.length_px / placer.library.poses.fps;
-        let hovering_px = placer.speed_around(frame).min(HOVERING_BL_PER_S) * px_per_frame;
-        let mut most_px = MAX_CORRECTION_SHARE * step[0].hypot(step[1]).max(hovering_px);
-        let home = self.world.home_px(frame, scale);
-        let (goal, share) = home.map_or((moment.around.goal_px, self.pull), |home| (home, 1.0));
-        if home.is_some() && node.since <= placer.params.fade_frames {
-            most_px = placer.calibration.speed_limits_bl_per_s[1] * px_per_frame;
-        }
-        let off = [0, 1].map(|axis| share * (goal[axis] - place[axis]));
-        let share = (most_px / off[0].hypot(off[1]).max(1e-9)).min(1.0);
-        off.map(|px| share * px)
     }
 
     /// Returns a node with the cost of its frame and its place added.
