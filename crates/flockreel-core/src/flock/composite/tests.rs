@@ -119,7 +119,7 @@ fn behind_a_wire(row: u32) -> Library {
 
 #[test]
 fn occluders_are_drawn_only_with_the_filmed_background() {
-    const ROW: usize = 120;
+    const ROW: usize = 160;
     let library = behind_a_wire(ROW as u32);
     // The flock is made from the library without the wire, so that animals swim behind the wire.
     let mut flock = flock(&synthetic::library(View::Top), "swarm");
