@@ -107,26 +107,12 @@ pub fn plan_flock(
     if library.playback.component.is_empty() || library.playback.jumps.is_empty() {
         return Err(Error::NoTransitions);
     }
-    let mut params = params.clone();
-    let is_film = params.position == Position::Film && !params.is_loop;
-    let is_carried = is_film && Support::new(library, &Lens::new(library, &params)).is_some();
-    if is_carried {
-        // What carries the animal is not mirrored, and has a depth of its own.
-        params.mirror = false;
-        params.depth_bl = params.depth_bl.or(Some(0.0));
-    }
-    let lives_alone = is_carried || is_film && library.poses.view == View::Top;
-    let sociality = &mut params.rules.sociality;
-    *sociality = sociality.or(Some(if lives_alone { 0.0 } else { 1.0 }));
+    let (mut params, support) = resolved(params, library);
     let lens = Lens::new(library, &params);
-    let mut params = resolved(&params, &lens);
     let motion = motion_of(library, &lens);
     let tank = Tank::from_library(library, &lens, &motion, &params);
-    let support = Support::new(library, &lens).filter(|_| is_carried);
-    let n_carried = support
-        .as_ref()
-        .map(|support| support.capacity(CLEAR_BL * lens.length_px));
-    let room_for = tank.capacity().min(n_carried.unwrap_or(u32::MAX));
+    let stands = (support.iter()).map(|support| support.capacity(CLEAR_BL * lens.length_px));
+    let room_for = stands.fold(tank.capacity(), u32::min);
     params.count = params.count.or(Some(room_for.clamp(2, MOST_BY_DEFAULT)));
     let params = &params;
     let calibration = Calibration::from_library(library, &motion, lens.is_flat()).in_tank(&tank);
@@ -156,15 +142,7 @@ pub fn plan_flock(
     })?;
     let mut played = play(&spaced, progress)?;
     let states = motion::states(library, &motion);
-    let mut individuals = individuals(&model, &mut played, &states);
-    if let Some(support) = &support {
-        for one in &mut individuals {
-            let frames = one.source_frame.iter();
-            one.carried = frames
-                .map(|&frame| support.foot_px(frame).is_some())
-                .collect();
-        }
-    }
+    let individuals = individuals(&model, &mut played, &states, support.as_ref());
     let n_steps = individuals.len() * params.frames as usize;
     let course = played.course;
     Ok(Flock {
@@ -242,9 +220,10 @@ fn play_whole(
     })
 }
 
-/// Returns the parameters with options replaced that do not apply. A loop has one body size and uses `leash`
-/// instead of `film`. Without depth, headings are matched instead of directions.
-fn resolved(params: &Params, lens: &Lens) -> Params {
+/// Returns the parameters with options replaced that are null or do not apply, and what carries the animal. A
+/// loop has one body size and uses `leash` instead of `film`. Without depth, headings are matched instead of
+/// directions. What carries an animal is not mirrored, and is in the image plane.
+fn resolved(params: &Params, library: &Library) -> (Params, Option<Support>) {
     let mut params = params.clone();
     if params.is_loop && params.position == Position::Film {
         params.position = Position::Leash;
@@ -252,14 +231,29 @@ fn resolved(params: &Params, lens: &Lens) -> Params {
     if params.is_loop {
         params.variation = 0.0; // each individual continues as another
     }
-    if lens.is_flat() && params.matching.by == MatchBy::Direction {
+    let is_film = params.position == Position::Film;
+    let support = Support::new(library, &Lens::new(library, &params)).filter(|_| is_film);
+    if support.is_some() {
+        params.mirror = false;
+        params.depth_bl = params.depth_bl.or(Some(0.0));
+    }
+    if Lens::new(library, &params).is_flat() && params.matching.by == MatchBy::Direction {
         params.matching.by = MatchBy::Heading;
     }
-    params
+    let lives_alone = support.is_some() || is_film && library.poses.view == View::Top;
+    let sociality = if lives_alone { 0.0 } else { 1.0 };
+    params.rules.sociality = params.rules.sociality.or(Some(sociality));
+    (params, support)
 }
 
 /// Returns the individuals of a flock. Takes the placements out of `played`.
-fn individuals(model: &Model, played: &mut Played, states: &[MotionState]) -> Vec<Individual> {
+fn individuals(
+    model: &Model,
+    played: &mut Played,
+    states: &[MotionState],
+    support: Option<&Support>,
+) -> Vec<Individual> {
+    let is_carried = |support: &Support, frame: u32| support.foot_px(frame).is_some();
     let course = &played.course;
     let placed = std::mem::take(&mut played.placed);
     (0u32..)
@@ -281,7 +275,9 @@ fn individuals(model: &Model, played: &mut Played, states: &[MotionState]) -> Ve
                 scale: placed.scale,
                 size: placed.size,
                 state: (shown.iter().map(|shown| states[shown.0 as usize])).collect(),
-                carried: Vec::new(),
+                carried: (support.iter())
+                    .flat_map(|support| shown.iter().map(|shown| is_carried(support, shown.0)))
+                    .collect(),
                 depth_m: placed.depth_m,
                 boid: boid.clone(),
                 cost: plan.cost.in_radians(),

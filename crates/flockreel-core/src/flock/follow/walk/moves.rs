@@ -2,7 +2,7 @@
 //! correction that the view allows.
 
 use super::{Moment, Node, Walker};
-use crate::flock::follow::places::MAX_BEYOND_BL;
+use crate::flock::follow::places::{MAX_BEYOND_BL, Place};
 use crate::flock::placement::is_jump;
 use crate::geometry::{rounded, wrap_rad};
 use crate::library::View;
@@ -39,7 +39,12 @@ impl Walker<'_> {
         }
         let mut place = [0, 1].map(|axis| before.centroid_px[axis] + step[axis]);
         if is_side {
-            let correction = self.correction_px(&node, to.0, place, step, scale, moment);
+            let stepped = Place {
+                frame: to.0,
+                centroid_px: place,
+                scale,
+            };
+            let correction = self.correction_px(&node, stepped, step, moment);
             place = [0, 1].map(|axis| place[axis] + correction[axis]);
         }
         let [last, beyond] =
@@ -90,22 +95,20 @@ impl Walker<'_> {
     fn correction_px(
         &self,
         node: &Node,
-        frame: u32,
-        place: [f64; 2],
+        place: Place,
         step: [f64; 2],
-        scale: f64,
         moment: &Moment,
     ) -> [f64; 2] {
         let placer = self.placer;
-        let px_per_frame = scale * placer.lens.length_px / placer.library.poses.fps;
-        let hovering_px = placer.speed_around(frame).min(HOVERING_BL_PER_S) * px_per_frame;
+        let px_per_frame = place.scale * placer.lens.length_px / placer.library.poses.fps;
+        let hovering_px = placer.speed_around(place.frame).min(HOVERING_BL_PER_S) * px_per_frame;
         let mut most_px = MAX_CORRECTION_SHARE * step[0].hypot(step[1]).max(hovering_px);
-        let home = self.world.home_px(frame, scale);
+        let home = self.world.home_px(place.frame, place.scale);
         let (goal, share) = home.map_or((moment.around.goal_px, self.pull), |home| (home, 1.0));
         if home.is_some() && node.since <= placer.params.fade_frames {
             most_px = placer.calibration.speed_limits_bl_per_s[1] * px_per_frame;
         }
-        let off = [0, 1].map(|axis| share * (goal[axis] - place[axis]));
+        let off = [0, 1].map(|axis| share * (goal[axis] - place.centroid_px[axis]));
         let share = (most_px / off[0].hypot(off[1]).max(1e-9)).min(1.0);
         off.map(|px| share * px)
     }
