@@ -54,13 +54,17 @@ impl Support {
         let rates: Vec<Option<f64>> = (0..poses.frames.len()).map(rate).collect();
         let keeps = |rate: &Option<f64>| rate.is_some_and(|rate| rate < REST_BL_PER_S);
         let n_known = rates.iter().flatten().count();
-        let n_kept = rates.iter().filter(|rate| keeps(rate)).count();
-        if 2 * n_kept <= n_known {
+        // A foot keeps its height for a moment at the top of a leap, too.
+        let runs = rates.chunk_by(|a, b| keeps(a) == keeps(b));
+        let is_carried: Vec<bool> = runs
+            .flat_map(|run| vec![keeps(&run[0]) && run.len() >= 2 * reach; run.len()])
+            .collect();
+        if 2 * is_carried.iter().filter(|&&is_carried| is_carried).count() <= n_known {
             return None;
         }
-        let carried = rates.iter().enumerate();
+        let carried = is_carried.iter().enumerate();
         let foot_px: Vec<Option<f64>> = carried
-            .map(|(frame, rate)| keeps(rate).then(|| foot(frame)).flatten())
+            .map(|(frame, &is_carried)| is_carried.then(|| foot(frame)).flatten())
             .map(|foot| foot.map(|([_, y], bottom)| bottom - y))
             .collect();
         let mut landing = vec![None; foot_px.len()];
