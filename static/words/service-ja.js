@@ -47,6 +47,7 @@ export default {
   "code.internal": "サービスの内部でエラーが起きました。", "code.internal.advice": "もう一度試してください。それでも直らない場合は、管理者に連絡してください。",
 
   "hint.count": "群れの個体数です。", "hint.frames": "動画の長さです。個体数が多いほど、上限は短くなります。",
+  "hint.rules.sociality": "整列と結合をこの割合で働かせます。自動では、泳ぐ動物や飛ぶ動物は1、床や止まり木にいる動物は0です。",
   "hint.rules.alignment": "近くの個体と速度をそろえる強さです。", "hint.rules.cohesion": "近くの個体に近づく強さです。", "hint.rules.separation": "近すぎる個体から離れる強さです。",
   "hint.rules.wander": "不規則に方向を変える強さです。1にすると、撮影した動物と同じくらい向きが変わります。", "hint.rules.circling": "範囲の中心の周りを回る強さです。", "hint.rules.walls": "壁と障害物を避ける強さです。弱いと、遅い個体が壁際にたまります。",
   "hint.rules.separation_bl": "この距離より近い個体から離れます。", "hint.rules.alignment_bl": "この距離までの個体と速度をそろえます。", "hint.rules.cohesion_bl": "この距離までの個体に近づきます。",

@@ -4,7 +4,7 @@
 
 const MAIN = ["count", "frames"];
 const MORE = ["seed", "loop"];
-const MOVE = ["rules.alignment", "rules.cohesion", "rules.separation", "rules.wander", "rules.circling", "rules.walls", "spacing_bl", "leaders", "variation", "depth_bl", "position", "tank"];
+const MOVE = ["rules.sociality", "rules.alignment", "rules.cohesion", "rules.separation", "rules.wander", "rules.circling", "rules.walls", "spacing_bl", "leaders", "variation", "depth_bl", "position", "tank"];
 const FINE = ["rules.separation_bl", "rules.alignment_bl", "rules.cohesion_bl", "rules.picture_separation_bl", "rules.view_deg", "rules.neighbors", "separation", "mirror", "dwell_frames", "fade_frames"];
 const ZONES = ["rules.zones.repulsion_bl", "rules.zones.orientation_bl", "rules.zones.attraction_bl", "rules.zones.noise_rad"];
 const MATCHING = ["matching.by", "matching.w_h", "matching.w_v", "matching.rho_deg", "matching.w_r", "matching.w_c", "matching.wx", "matching.w_p", "matching.w_d", "matching.segment_frames"];
@@ -13,7 +13,7 @@ const FILES = ["render.ground_truth", "render.overlay"];
 /** Settings with controls of their own. */
 const OWN = ["preset", "goals", "obstacles", "predator", "render.background", "render.size_px", "render.formats"];
 /** Rules that the three zones replace. */
-const REPLACED = ["rules.separation", "rules.alignment", "rules.cohesion", "rules.circling", "rules.wander", "rules.separation_bl", "rules.alignment_bl", "rules.cohesion_bl"];
+const REPLACED = ["rules.sociality", "rules.separation", "rules.alignment", "rules.cohesion", "rules.circling", "rules.wander", "rules.separation_bl", "rules.alignment_bl", "rules.cohesion_bl"];
 
 /**
  * Returns the names of a service's settings by the part of the panel.

@@ -26,7 +26,7 @@ const PROSE = {
   "count": [1, 10_000], "frames": [1, 1_000_000], "spacing_bl": [0.2, 10], "depth_bl": [0, 100], "variation": [0, 0.3],
   "dwell_frames": [1, 120], "fade_frames": [0, 16], "rules.view_deg": [1, 360], "rules.neighbors": [1, 2000],
   "rules.picture_separation_bl": [0, 50], "rules.zones.orientation_bl": [0, 50], "rules.zones.attraction_bl": [0, 50],
-  "rules.zones.noise_rad": [0, 1], "matching.rho_deg": [0, 45], "matching.w_d": [0, 1], "matching.segment_frames": [2, 2000],
+  "rules.sociality": [0, 1], "rules.zones.noise_rad": [0, 1], "matching.rho_deg": [0, 45], "matching.w_d": [0, 1], "matching.segment_frames": [2, 2000],
   "render.haze_per_bl": [0, 1], "render.shadow": [0, 1],
 };
 

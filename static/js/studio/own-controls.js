@@ -17,15 +17,19 @@ export const radio = (name, value, label, choose, help = "") => {
   return { input, node: element("label.chip", { title: help }, input, element("span", {}, label)) };
 };
 
+/** The choice without a preset: the flock lives as the filmed animal does. */
+const NATURAL = "natural";
+
 /** Buttons for the behaviors. @param {Studio} studio */
 export function presets(studio) {
-  const all = (studio.fields.get("preset")?.choices ?? []).map((name) => radio("preset", name, choiceOf("preset", name), () => studio.change({ preset: name }), sayOr(`preset.${name}`, "")));
+  const names = [NATURAL, ...(studio.fields.get("preset")?.choices ?? [])];
+  const all = names.map((name) => radio("preset", name, choiceOf("preset", name), () => studio.change({ preset: name === NATURAL ? undefined : name }), sayOr(`preset.${name}`, "")));
   const help = element("p.soft");
   return {
     node: element("fieldset.presets", {}, element("legend", {}, nameOf("preset")), element("div.chips", {}, ...all.map(({ node }) => node)), help),
     update(/** @type {string | undefined} */ name) {
-      for (const { input } of all) input.checked = input.value === (name ?? "school");
-      help.textContent = sayOr(`preset.${name ?? "school"}`, "");
+      for (const { input } of all) input.checked = input.value === (name ?? NATURAL);
+      help.textContent = sayOr(`preset.${name ?? NATURAL}`, "");
     },
   };
 }
