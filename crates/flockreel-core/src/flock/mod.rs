@@ -21,7 +21,6 @@ pub mod plan;
 pub mod quality;
 mod rotation;
 pub mod space;
-mod support;
 #[cfg(test)]
 pub(crate) mod synthetic;
 
@@ -38,13 +37,13 @@ use self::boids::calibration::Calibration;
 use self::boids::tank::Tank;
 use self::course::Course;
 use self::follow::places::CLEAR_BL;
+use self::follow::support::Support;
 use self::individual::MotionState;
 use self::lens::Lens;
 use self::motion::motion_of;
 use self::params::{MOST_BY_DEFAULT, MatchBy, Position};
 use self::placement::{Placed, Placer};
 use self::plan::{Model, Plan, Planner};
-use self::support::Support;
 use crate::geometry::rounded;
 use crate::library::{Library, View};
 use crate::parameters::Parameters;

@@ -8,6 +8,7 @@
 mod natural;
 pub(super) mod places;
 mod steps;
+pub(super) mod support;
 mod walk;
 
 use std::ops::Range;
@@ -17,6 +18,7 @@ use rayon::prelude::*;
 use self::natural::NaturalPlayback;
 use self::places::{HomeRange, World};
 use self::steps::Trajectory;
+use self::support::Support;
 use self::walk::{Node, Other, Walk, Walker};
 use super::boids::Boids;
 use super::boids::vector::{norm, scaled};
@@ -24,7 +26,6 @@ use super::course::{Course, steps};
 use super::placement::Placer;
 use super::plan::segment::PlaybackStatus;
 use super::plan::{Model, Plan};
-use super::support::Support;
 use super::{Error, Played};
 use crate::library::View;
 use crate::progress::Progress;
@@ -36,8 +37,12 @@ const SEGMENT_S: f64 = 3.0;
 /// Greatest distance from the filmed places at which an individual that is carried stands, body lengths. Free
 /// choice.
 const ASIDE_BL: f64 = 0.45;
-/// Number of individuals that are planned at the same time. Free choice.
-const ROUND_SIZE: usize = 2;
+/// Number of individuals that are planned at the same time: at least two, and this share of a flock. Free
+/// choices.
+const MIN_ROUND: usize = 2;
+const ROUND_SHARE: usize = 16;
+/// Number of others, the nearest in the middle of a segment, to which an individual pays heed. Free choice.
+const N_NEAREST: usize = 16;
 
 /// Returns the first frame of each segment, and as the last entry the number of frames.
 pub(super) fn segments(n_frames: usize, segment_frames: Option<u32>, fps: f64) -> Vec<usize> {
@@ -139,20 +144,20 @@ impl Follower<'_> {
             .collect();
         let mut walks: Vec<Walk> = Vec::with_capacity(n);
         while walks.len() < n {
-            let ids = walks.len()..(walks.len() + ROUND_SIZE).min(n);
+            let ids = walks.len()..(walks.len() + MIN_ROUND.max(n / ROUND_SHARE)).min(n);
             let walk = |id: usize| {
                 let walker = self.walker(id);
-                let planned = walks.iter().map(|walk| Other {
-                    places_px: &walk.trajectory.centroid_px,
-                    states: Some(&walk.states),
-                });
-                let rest = (walks.len()..n)
-                    .filter(|other| *other != id)
-                    .map(|other| Other {
+                let other = |&other: &usize| match walks.get(other) {
+                    Some(walk) => Other {
+                        places_px: &walk.trajectory.centroid_px,
+                        states: Some(&walk.states),
+                    },
+                    None => Other {
                         places_px: &goals[other],
                         states: None,
-                    });
-                let others: Vec<Other> = planned.chain(rest).collect();
+                    },
+                };
+                let others: Vec<Other> = nearest(&goals, id).iter().map(other).collect();
                 let moments = walker.moments(&course.tracks[id], &others);
                 (walker.walk(self.last_node(id), &moments, first)).ok_or(Error::NoTransitions)
             };
@@ -189,7 +194,7 @@ impl Follower<'_> {
             aside_px: ASIDE_BL * placer.lens.length_px * aside,
             radius_scale: placer.tank.radius_scale(self.plans.len()),
         };
-        Walker::new(self.model, world, placer.size(id))
+        Walker::new(self.model, world, placer.size(id), self.plans.len())
     }
 
     /// Returns the frame and place that an individual showed last.
@@ -243,6 +248,25 @@ impl Follower<'_> {
             n_clipped: self.n_clipped,
         }
     }
+}
+
+/// Returns the ids of the individuals nearest to `id` in the middle of a segment.
+fn nearest(goals: &[Vec<[f64; 2]>], id: usize) -> Vec<usize> {
+    let middle = |id: usize| goals[id][goals[id].len() / 2];
+    let [x, y] = middle(id);
+    let square = |other: usize| {
+        let [ox, oy] = middle(other);
+        (ox - x) * (ox - x) + (oy - y) * (oy - y)
+    };
+    let others = (0..goals.len()).filter(|&other| other != id);
+    let mut others: Vec<(f64, usize)> = others.map(|other| (square(other), other)).collect();
+    let by_distance = |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+    if others.len() > N_NEAREST {
+        others.select_nth_unstable_by(N_NEAREST, by_distance);
+        others.truncate(N_NEAREST);
+    }
+    others.sort_by(by_distance);
+    others.into_iter().map(|(_, other)| other).collect()
 }
 
 #[cfg(test)]

@@ -4,10 +4,10 @@
 //! where, and what carried it. A place costs the more, the less the filmed animal would have been there. It
 //! also costs to be in another animal or far from the boid.
 
+use super::support::Support;
 use crate::flock::boids::vector::dot;
 use crate::flock::lens::Lens;
 use crate::flock::placement::Placer;
-use crate::flock::support::Support;
 use crate::library::Library;
 
 /// Distance below which another animal is too near, body lengths. Free choice.

@@ -109,34 +109,6 @@ impl Model {
         [heading, speed.min(CEILING - 1 - heading)]
     }
 
-    /// Returns the cost of showing states after the one before, without crowd cost. The states were chosen by
-    /// their places too.
-    pub fn cost_of_walk(
-        &self,
-        wanted: &[Feature],
-        before: Option<u32>,
-        states: &[u32],
-    ) -> CostParts {
-        let mut cost = CostParts {
-            weighs_places: true,
-            ..CostParts::default()
-        };
-        for (&wanted, &state) in wanted.iter().zip(states) {
-            let [heading, speed] = self.match_costs(wanted, state);
-            cost.heading += u64::from(heading);
-            cost.speed += u64::from(speed);
-        }
-        let befores = before.into_iter().chain(states.iter().copied());
-        let afters = &states[usize::from(before.is_none()).min(states.len())..];
-        for (from, &to) in befores.zip(afters).filter(|(from, to)| **to != from + 1) {
-            let repetition = self.repetition_cost(from, to);
-            cost.repetition += u64::from(repetition);
-            cost.transition += u64::from(self.trellis.jump_cost(from, to) - repetition);
-        }
-        cost.total = cost.heading + cost.speed + cost.transition + cost.repetition;
-        cost
-    }
-
     /// Returns the future cost of a state, in turns.
     pub fn future(&self, state: u32) -> u32 {
         self.future[state as usize]

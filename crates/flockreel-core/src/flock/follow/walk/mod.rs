@@ -16,8 +16,9 @@ use crate::flock::plan::cost::Feature;
 use crate::geometry::{Turns, rounded, wrap_rad};
 use crate::library::View;
 
-/// Number of beginnings kept at each frame. Free choice.
-const WIDTH: usize = 32;
+/// Number of beginnings kept at each frame in a flock of up to 64 individuals, and in the largest. Free
+/// choices.
+const WIDTHS: [usize; 2] = [32, 8];
 /// Side of the cells, body lengths, and number of headings to a radian, within which two beginnings that show
 /// nearly the same frame count as one. Free choices.
 const CELL_BL: f64 = 0.3;
@@ -99,6 +100,8 @@ pub(super) struct Walker<'a> {
     model: &'a Model,
     world: World<'a>,
     placer: &'a Placer<'a>,
+    /// Number of beginnings kept at each frame.
+    width: usize,
     /// Size of the individual relative to the filmed animal.
     size: f64,
     /// Top view: cost of a frame for each radian between the headings of the individual and its boid.
@@ -109,7 +112,8 @@ pub(super) struct Walker<'a> {
 }
 
 impl<'a> Walker<'a> {
-    pub(super) fn new(model: &'a Model, world: World<'a>, size: f64) -> Walker<'a> {
+    /// Returns the search for an individual of a flock of `n`.
+    pub(super) fn new(model: &'a Model, world: World<'a>, size: f64, n: usize) -> Walker<'a> {
         let placer = world.placer;
         let share = |time_s: f64| 1.0 - libm::exp(-1.0 / (time_s * placer.library.poses.fps));
         let params = placer.params;
@@ -122,6 +126,7 @@ impl<'a> Walker<'a> {
             world,
             placer,
             course_weight,
+            width: (WIDTHS[0] * 64 / n.max(1)).clamp(WIDTHS[1], WIDTHS[0]),
             size,
             pull: share(PULL_S),
             follow: share(ROTATION_S),
@@ -323,7 +328,7 @@ impl<'a> Walker<'a> {
         let cell_px = CELL_BL * self.placer.lens.length_px;
         let mut n_kept = 0;
         nodes.retain(|node| {
-            if n_kept == WIDTH {
+            if n_kept == self.width {
                 return false;
             }
             let [x, y] = node.centroid_px.map(|px| (px / cell_px).floor() as i64);

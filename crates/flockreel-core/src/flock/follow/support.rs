@@ -4,8 +4,8 @@
 //! height, while that of one that swims or flies rises and sinks. An animal counts as carried in a film if its
 //! foot keeps its height in most frames. It is then shown only where something carries it.
 
-use super::lens::Lens;
-use super::motion::REST_BL_PER_S;
+use crate::flock::lens::Lens;
+use crate::flock::motion::REST_BL_PER_S;
 use crate::library::{Library, View};
 
 /// Time before and after a frame over which the height of the foot is compared, seconds. Free choice.
@@ -19,7 +19,7 @@ const GOES_ON_BL: f64 = 0.2;
 
 /// What carries the filmed animal.
 #[derive(Clone, Debug)]
-pub(super) struct Support {
+pub(in crate::flock) struct Support {
     /// Distance from the centroid down to the foot, pixels; `None` if the animal is not carried in the frame.
     foot_px: Vec<Option<f64>>,
     /// Frame in which the animal lands after its next flight, from each frame on.
@@ -37,7 +37,7 @@ struct Ledge {
 
 impl Support {
     /// Returns the support of a library's animal, or `None` if it swims, flies or is seen from above.
-    pub(super) fn new(library: &Library, lens: &Lens) -> Option<Support> {
+    pub(in crate::flock) fn new(library: &Library, lens: &Lens) -> Option<Support> {
         let poses = &library.poses;
         if poses.view == View::Top {
             return None;
@@ -90,7 +90,7 @@ impl Support {
 
     /// Returns the distance from the centroid down to the foot, pixels, or `None` if the animal is not carried
     /// in the frame.
-    pub(super) fn foot_px(&self, frame: u32) -> Option<f64> {
+    pub(in crate::flock) fn foot_px(&self, frame: u32) -> Option<f64> {
         self.foot_px[frame as usize]
     }
 
@@ -111,7 +111,7 @@ impl Support {
     }
 
     /// Returns the number of animals that can stand `clear_px` apart.
-    pub(super) fn capacity(&self, clear_px: f64) -> u32 {
+    pub(in crate::flock) fn capacity(&self, clear_px: f64) -> u32 {
         let mut stands: Vec<[f64; 2]> = Vec::new();
         for ledge in &self.ledges {
             let [left, right] = ledge.ends_px;
