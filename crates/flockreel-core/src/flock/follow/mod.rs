@@ -185,8 +185,8 @@ impl Follower<'_> {
     /// Returns the search for the walks of an individual.
     fn walker(&self, id: usize) -> Walker<'_> {
         let placer = self.placer;
-        // Fractional parts of multiples of the golden ratio are spread evenly.
-        let aside = 2.0 * (std::f64::consts::GOLDEN_RATIO * id as f64).fract() - 1.0;
+        // Fractional parts of multiples of the golden ratio are spread evenly. The first stays in the middle.
+        let aside = 2.0 * (std::f64::consts::GOLDEN_RATIO * id as f64 + 0.5).fract() - 1.0;
         let world = World {
             placer,
             home_range: &self.home_range,
