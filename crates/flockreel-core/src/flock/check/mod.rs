@@ -1,9 +1,9 @@
 //! Independent check of a stored plan: `flockreel check-plan` (docs/explanation/algorithms.md, "Planning").
 //!
 //! Every step must be the next frame or a jump of the library, after the dwell. The total cost must be right,
-//! and no cheaper plan may exist. Plans with `position: film` also weigh places, which are not in the file, so
-//! for them only steps and costs are checked, except those of older files. All kinds of plans are checked: whole films, segments and loops, in
-//! every view, but not with `matching.by: direction`. The division of a total into its parts is not checked,
+//! and no cheaper plan may exist. Plans with `position: film` also weigh places, whose costs are not in the
+//! file. Only their steps and costs are checked; in files up to schema 2 they must be the cheapest too. Whole
+//! films, segments and loops are checked in every view, but not with `matching.by: direction`. The division of a total into its parts is not checked,
 //! only their sum.
 //!
 //! `costs` and `optimum` use no code of `flock::plan`. The motion of the filmed animal and the limits of

@@ -1,9 +1,8 @@
 //! Flocks with `position: film`: boids choose directions, while speeds and steps are filmed ones.
 //!
 //! A flock is made segment by segment. Each boid starts a segment at the position of its animal. It moves at
-//! the speeds of the animal's natural continuation (`natural`). The plan of the segment starts from the frame
-//! shown last (`plan::segment`). The animal then moves by the filmed steps of the planned frames, corrected a
-//! little toward the boid (`advance`).
+//! the speeds of the animal's natural continuation (`natural`). A search then chooses the frames of each
+//! individual together with the places to which their filmed steps lead (`walk`, `places`, `support`).
 
 mod natural;
 pub(super) mod places;

@@ -93,7 +93,7 @@ struct Edge {
     offset: f64,
 }
 
-/// What lies around an individual at a frame.
+/// Boid, walls and other animals near an individual at a frame.
 #[derive(Clone, Debug)]
 pub(super) struct Surroundings {
     /// Position of the boid.
@@ -116,7 +116,7 @@ pub(super) struct Place {
 pub(super) struct World<'a> {
     pub(super) placer: &'a Placer<'a>,
     pub(super) home_range: &'a HomeRange,
-    /// What carries the animal, if anything does.
+    /// Perches and floors that carry the animal; `None` if it swims or flies.
     pub(super) support: Option<&'a Support>,
     /// Distance to the right that an individual keeps from the filmed places if it is carried, pixels.
     pub(super) aside_px: f64,

@@ -17,7 +17,7 @@ const BRIDGED_BL: f64 = 1.0;
 /// How far a ledge goes on beyond the outermost foothold, body lengths. Free choice.
 const GOES_ON_BL: f64 = 0.2;
 
-/// What carries the filmed animal.
+/// Perches and floors that carry the filmed animal, and the frames in which they do.
 #[derive(Clone, Debug)]
 pub(in crate::flock) struct Support {
     /// Distance from the centroid down to the foot, pixels; `None` if the animal is not carried in the frame.

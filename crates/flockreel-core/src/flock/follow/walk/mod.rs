@@ -2,8 +2,7 @@
 //!
 //! The place of an animal is the sum of the filmed steps of the frames shown, so frames are chosen together
 //! with their places. A beam search keeps the cheapest beginnings of a segment, frame after frame. The cost of
-//! a beginning is that of its frames and jumps, as in other plans, and that of its places (`places`). In a film
-//! with few jumps all beginnings fit into the beam, and the search is then exhaustive.
+//! a beginning is that of its frames and jumps, as in other plans, and that of its places (`places`).
 
 mod moves;
 
@@ -35,7 +34,7 @@ const AHEAD_S: f64 = 0.8;
 const PULL_S: f64 = 0.5;
 const ROTATION_S: f64 = 0.15;
 
-/// What an individual finds at a frame.
+/// Boid and surroundings of an individual at a frame.
 pub(super) struct Moment {
     wanted: Feature,
     heading_rad: f64,
