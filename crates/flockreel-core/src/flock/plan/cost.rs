@@ -4,6 +4,7 @@
 //! In side view headings are compared. In top view a sprite can be rotated to any heading, so the turns of
 //! animal and boid within a quarter of a second are compared.
 
+use super::recursion::CEILING;
 use super::trellis::Trellis;
 use crate::flock::boids::vector::Vec3;
 use crate::flock::individual::BoidTrack;
@@ -12,9 +13,6 @@ use crate::flock::params::{MatchBy, Matching};
 use crate::geometry::angle::mirrored_rad;
 use crate::geometry::{Turns, wrap_rad};
 use crate::library::{Jump, Library, View};
-
-/// Upper limit, exclusive, of the cost of showing a state at a frame, in turns.
-pub const CEILING: u32 = 1 << 17;
 
 /// Length of a unit vector in a feature.
 const UNIT: f64 = 16384.0;
@@ -184,6 +182,22 @@ impl Weights {
     pub fn total(&self, wanted: Feature, state: Feature) -> u32 {
         let [heading, speed] = self.parts_of(wanted, state);
         (heading + speed).min(CEILING - 1)
+    }
+
+    /// Writes the totals of all states where `wanted` is asked for.
+    #[inline(always)]
+    pub fn fill(&self, wanted: Feature, states: &[Feature], out: &mut [u32]) {
+        let pairs = out.iter_mut().zip(states);
+        match self.by {
+            MatchBy::Direction => pairs.for_each(|(out, &state)| *out = self.total(wanted, state)),
+            MatchBy::Heading | MatchBy::Position => pairs.for_each(|(out, state)| {
+                let [heading, speed] = self.of_gaps(
+                    [wanted.turns, state.turns],
+                    [wanted.log_speed, state.log_speed],
+                );
+                *out = (heading + speed).min(CEILING - 1);
+            }),
+        }
     }
 
     /// Returns the features that a boid asks for at every frame, from its track as stored in the file.

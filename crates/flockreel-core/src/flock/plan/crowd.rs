@@ -5,10 +5,7 @@
 //! can therefore be recomputed from the files. Distances are whole 32nds of a body length and the costs are
 //! a table, so results are the same on every machine.
 
-use std::ops::Range;
-
 use super::trellis::Trellis;
-use super::viterbi::FRAMES;
 use crate::flock::individual::BoidTrack;
 use crate::geometry::Turns;
 
@@ -30,17 +27,8 @@ const N_SEQUENTIAL: usize = 64;
 /// Number of individuals in a round. Free choice.
 const ROUND_SIZE: usize = 16;
 
-/// Number of distances computed before their costs are looked up. Free choice.
-const DISTANCE_BATCH: usize = 32;
-
 /// Position of a boid, in 32nds of a body length.
 pub type Place = [i32; 3];
-
-/// Positions of boids at one frame, axis after axis, by id.
-#[derive(Clone, Debug, Default)]
-pub struct Places {
-    axes: [Vec<i32>; 3],
-}
 
 /// Parameters of the crowd cost, in frames, 32nds of a body length, and turns.
 #[derive(Clone, Debug)]
@@ -92,32 +80,6 @@ impl Crowd {
         self.costs[self.step(a, b) as usize]
     }
 
-    /// Writes the costs of individual `id` for looking like each of `others`, in turns, into the entries
-    /// `moment` of `costs`.
-    #[inline(always)]
-    pub fn costs_at(
-        &self,
-        id: usize,
-        others: Range<usize>,
-        places: &Places,
-        moment: usize,
-        costs: &mut [[u32; FRAMES]],
-    ) {
-        let here = places.of(id);
-        let axes = places.axes.each_ref();
-        let [x, y, z] = axes.map(|axis| axis[others.clone()].chunks(DISTANCE_BATCH));
-        for (costs, ((x, y), z)) in costs.chunks_mut(DISTANCE_BATCH).zip(x.zip(y).zip(z)) {
-            // First the arithmetic of all distances, then the table.
-            let mut steps = [0; DISTANCE_BATCH];
-            for (step, ((&x, &y), &z)) in steps.iter_mut().zip(x.iter().zip(y).zip(z)) {
-                *step = self.step(here, [x, y, z]);
-            }
-            for (costs, step) in costs.iter_mut().zip(steps) {
-                costs[moment] = self.costs[step as usize];
-            }
-        }
-    }
-
     /// Returns the table entry for the distance between two positions.
     #[inline(always)]
     fn step(&self, a: Place, b: Place) -> u32 {
@@ -152,67 +114,5 @@ impl Crowd {
                 [low as u32, high.unwrap_or((at + reach).min(n)) as u32]
             })
             .collect()
-    }
-}
-
-impl Places {
-    /// Returns the position of one boid.
-    pub fn of(&self, id: usize) -> Place {
-        self.axes.each_ref().map(|axis| axis[id])
-    }
-}
-
-impl FromIterator<Place> for Places {
-    fn from_iter<I: IntoIterator<Item = Place>>(places: I) -> Places {
-        let mut all = Places::default();
-        for place in places {
-            for (axis, at) in all.axes.iter_mut().zip(place) {
-                axis.push(at);
-            }
-        }
-        all
-    }
-}
-
-/// Final plans, prepared for the individuals that watch them.
-#[derive(Clone, Debug)]
-pub struct FinalPlans {
-    /// `[t][id]`: state shown.
-    states: Vec<Vec<u32>>,
-    /// `[t][id]`: number of steady frames from `t` on, at most `FRAMES`. While frames are steady, the range
-    /// of states that look like the state shown moves on by one state per frame.
-    n_steady: Vec<Vec<u8>>,
-}
-
-impl FinalPlans {
-    /// Returns an empty set of plans for `n_frames` frames.
-    pub fn new(n_frames: usize) -> FinalPlans {
-        FinalPlans {
-            states: vec![Vec::new(); n_frames],
-            n_steady: vec![Vec::new(); n_frames],
-        }
-    }
-
-    /// Adds the states of the next individual. `alike` has the states that look like each state.
-    pub fn push(&mut self, states: &[u32], alike: &[[u32; 2]]) {
-        let alike = |t: usize| alike[states[t] as usize];
-        let mut n_steady = 0;
-        for (t, &state) in states.iter().enumerate().rev() {
-            let goes_on = t + 1 < states.len() && alike(t + 1) == alike(t).map(|end| end + 1);
-            n_steady = if goes_on { n_steady + 1 } else { 1 }.min(FRAMES as u8);
-            self.states[t].push(state);
-            self.n_steady[t].push(n_steady);
-        }
-    }
-
-    /// Returns the states shown at frame `t`, by id.
-    pub fn at(&self, t: usize) -> &[u32] {
-        &self.states[t]
-    }
-
-    /// Returns the number of steady frames from `t` on, by id, at most `FRAMES`. While frames are steady,
-    /// the range of states that look like the state shown moves on by one state per frame.
-    pub fn steady_at(&self, t: usize) -> &[u8] {
-        &self.n_steady[t]
     }
 }

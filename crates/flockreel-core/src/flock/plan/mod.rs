@@ -2,35 +2,29 @@
 //!
 //! For each individual, the planner finds the sequence of real frames that follows its boid at the least
 //! cost, exactly (Okabe et al., section 5.1; docs/explanation/algorithms.md, "Planning"). `cost` and
-//! `crowd` define the costs, `viterbi` finds the cheapest path, `segment` and `loops` handle segments and
-//! loops.
+//! `crowd` define the costs, `recursion` finds the cheapest path, `loops` handles loops.
 
-mod conditions;
 pub mod cost;
 pub mod crowd;
-mod fill;
 mod individual_plan;
-pub mod landings;
-#[cfg(target_arch = "x86_64")]
-mod lanes;
 pub mod loops;
-mod range_costs;
-mod round;
+pub mod recursion;
 pub mod segment;
 mod state_costs;
 pub mod trellis;
-pub mod viterbi;
+
+use std::sync::Mutex;
 
 use rayon::prelude::*;
 
-use self::conditions::FORBIDDEN;
-use self::cost::{CEILING, Feature, Weights};
-use self::crowd::{Crowd, FinalPlans, Places};
+use self::cost::{Feature, Weights};
+use self::crowd::{Crowd, Place};
 pub use self::individual_plan::{CostParts, Plan};
 use self::loops::LoopEnds;
-use self::segment::{PlaybackStatus, future_costs};
+use self::recursion::{CEILING, Path, PathSearch, StateCosts};
+use self::segment::{FORBIDDEN, future_costs};
+use self::state_costs::IndividualCosts;
 use self::trellis::Trellis;
-use self::viterbi::{Path, PathSearch, TracePool};
 use super::error::Error;
 use super::individual::BoidTrack;
 use super::motion::FrameMotion;
@@ -54,7 +48,6 @@ pub struct Model {
     /// By state: the states that look like it, as first and one past the last.
     alike: Vec<[u32; 2]>,
     fps: f64,
-    trace_pool: TracePool,
     /// Target state and cost of each jump, in turns, by source state.
     jumps: Vec<Vec<(u32, u32)>>,
 }
@@ -87,7 +80,6 @@ impl Model {
             trellis,
             weights,
             fps,
-            trace_pool: TracePool::default(),
             jumps,
         }
     }
@@ -160,55 +152,35 @@ impl Model {
     }
 }
 
-/// Planner of all individuals, for a whole film or for one segment.
+/// Planner of all individuals of a film.
 pub struct Planner<'a> {
     model: &'a Model,
-    /// Positions of all boids, by frame.
-    places: Vec<Places>,
-    boids: &'a [BoidTrack],
-    /// State of each individual before the segment, by id; empty for the first segment. In later segments,
-    /// entry 0 of `places` belongs to the last frame of the previous segment.
-    statuses: &'a [PlaybackStatus],
-    /// Whether no segment follows.
-    is_last: bool,
+    /// Positions of all boids: `[frame][id]`.
+    places: Vec<Vec<Place>>,
+    /// Features that each boid asks for: `[id][frame]`.
+    wanted: Vec<Vec<Feature>>,
     /// In a loop, the ends of each plan, by id; else empty.
     ends: Vec<LoopEnds>,
+    /// Memory of searches, which is reused.
+    memory: Mutex<Vec<Vec<u32>>>,
 }
 
 impl<'a> Planner<'a> {
-    /// Returns a planner for a whole film.
-    pub fn new(model: &'a Model, boids: &'a [BoidTrack]) -> Planner<'a> {
-        Planner::for_segment(model, boids, &[], true)
-    }
-
-    /// Returns a planner for a segment. `boids` are the tracks within that segment.
-    pub fn for_segment(
-        model: &'a Model,
-        boids: &'a [BoidTrack],
-        statuses: &'a [PlaybackStatus],
-        is_last: bool,
-    ) -> Planner<'a> {
+    /// Returns a planner for a film.
+    pub fn new(model: &'a Model, boids: &[BoidTrack]) -> Planner<'a> {
         let n_frames = boids.first().map_or(0, |boid| boid.heading_rad.len());
         let place = |t| {
-            boids
-                .iter()
+            (boids.iter())
                 .map(|boid| model.crowd.place(boid, t))
                 .collect()
         };
-        let before = (!statuses.is_empty()).then_some(0);
         Planner {
             model,
-            places: before.into_iter().chain(0..n_frames).map(place).collect(),
-            boids,
-            statuses,
-            is_last,
+            places: (0..n_frames).map(place).collect(),
+            wanted: boids.par_iter().map(|boid| model.wanted(boid)).collect(),
             ends: Vec::new(),
+            memory: Mutex::default(),
         }
-    }
-
-    /// Returns the number of entries of `places` before the first planned frame.
-    fn n_before(&self) -> usize {
-        usize::from(!self.statuses.is_empty())
     }
 
     /// Returns the plans of all boids of a loop, by id. `continuations[id]` is the individual as which
@@ -222,10 +194,8 @@ impl<'a> Planner<'a> {
         if self.places.len() <= self.model.dwell {
             return Err(Error::LoopDoesNotClose(self.places.len()));
         }
-        let wanted = self.wanted();
-        let mut final_plans = FinalPlans::new(self.places.len());
-        let open = self.paths(&wanted, &mut final_plans, progress)?;
-        let first_states = self.first_states(&open, &wanted, continuations, progress)?;
+        let open = self.paths(progress)?;
+        let first_states = self.first_states(&open, continuations, progress)?;
         let next = continuations.iter().map(|&id| first_states[id as usize]);
         self.ends = (first_states.iter().zip(next))
             .map(|(&first, next)| LoopEnds { first, next })
@@ -233,77 +203,109 @@ impl<'a> Planner<'a> {
         self.plan(progress)
     }
 
-    /// Returns the features that each boid asks for, by id and frame.
-    fn wanted(&self) -> Vec<Vec<Feature>> {
-        let before = vec![Feature::default(); self.n_before()];
-        (self.boids.par_iter())
-            .map(|boid| {
-                let wanted = self.model.weights.wanted(boid, self.model.fps);
-                before.iter().copied().chain(wanted).collect()
-            })
-            .collect()
-    }
-
     /// Returns the plans of all boids, by id. Each plan is the cheapest, given the plans of the individuals
     /// that it watches. The least cost of each individual without crowd cost is computed in parallel, as
     /// the lower bound.
     pub fn plan(&self, progress: &dyn Progress) -> Result<Vec<Plan>, Error> {
-        let wanted = self.wanted();
-        let mut final_plans = FinalPlans::new(self.places.len());
-        let (paths, bounds) = rayon::join(
-            || self.paths(&wanted, &mut final_plans, progress),
-            || self.least_costs(&wanted, progress),
-        );
+        let (paths, bounds) = rayon::join(|| self.paths(progress), || self.least_costs(progress));
         let (paths, bounds) = (paths?, bounds?);
         Ok((paths.par_iter().enumerate())
-            .map(|(id, path)| self.costed(path, &wanted[id], bounds[id]))
+            .map(|(id, path)| self.costed(id, path, bounds[id]))
             .collect())
     }
 
-    /// Returns the paths of all boids, by id, computed in rounds. The paths of a round are final before the
-    /// next round starts.
-    fn paths(
-        &self,
-        wanted: &[Vec<Feature>],
-        final_plans: &mut FinalPlans,
-        progress: &dyn Progress,
-    ) -> Result<Vec<Path>, Error> {
-        let mut paths = Vec::with_capacity(wanted.len());
-        while paths.len() < wanted.len() {
+    /// Returns the paths of all boids, by id. They are computed in rounds of individuals that watch the same
+    /// others: each of the first 64 is a round of its own. Fails if an individual has no path.
+    fn paths(&self, progress: &dyn Progress) -> Result<Vec<Path>, Error> {
+        let n_watched = |id| self.model.crowd.n_watched(id);
+        let mut shown = vec![Vec::new(); self.places.len()];
+        let mut paths = Vec::with_capacity(self.wanted.len());
+        while paths.len() < self.wanted.len() {
             if progress.cancelled() {
                 return Err(Error::Cancelled);
             }
-            let first = paths.len();
-            let n_watched = self.model.crowd.n_watched(first);
-            let alike = |id: &usize| self.model.crowd.n_watched(*id) == n_watched;
-            let end = first + (first..wanted.len()).take_while(alike).count();
-            let round = self.paths_of_round(first, &wanted[first..end], final_plans)?;
+            let rest = paths.len()..self.wanted.len();
+            let round = rest
+                .clone()
+                .take_while(|&id| n_watched(id) == n_watched(rest.start))
+                .count();
+            let ids = rest.start..rest.start + round;
+            let path = |id: usize| self.path_among(id, &shown);
+            let round: Vec<Path> = ids.into_par_iter().map(path).collect::<Result<_, _>>()?;
             for path in &round {
-                final_plans.push(self.states_in_film(path), &self.model.alike);
+                shown
+                    .iter_mut()
+                    .zip(&path.states)
+                    .for_each(|(shown, &state)| shown.push(state));
             }
             paths.extend(round);
         }
         Ok(paths)
     }
 
-    /// Returns the search for the paths of all individuals.
+    /// Returns the cheapest path of one individual, given the states that those of smaller id show.
+    fn path_among(&self, id: usize, shown: &[Vec<u32>]) -> Result<Path, Error> {
+        let costs = IndividualCosts {
+            planner: self,
+            wanted: &self.wanted[id],
+            among: Some((id, shown)),
+        };
+        let Some(ends) = self.ends.get(id) else {
+            return self
+                .cheapest_path(&self.search(), &costs)
+                .ok_or(Error::NoTransitions);
+        };
+        let start = self.beginning_with(ends.first);
+        let path = self.cheapest_path(&self.search_between(&start, Some(ends.next)), &costs);
+        path.ok_or(Error::LoopDoesNotClose(self.places.len()))
+    }
+
+    /// Returns the cheapest path of a search.
+    fn cheapest_path(&self, search: &PathSearch, costs: &impl StateCosts) -> Option<Path> {
+        let pool = || {
+            self.memory
+                .lock()
+                .unwrap_or_else(std::sync::PoisonError::into_inner)
+        };
+        let mut memory = pool().pop().unwrap_or_default();
+        let path = search.cheapest_path(costs, &mut memory);
+        pool().push(memory);
+        path
+    }
+
+    /// Returns the cost of each individual's cheapest path without crowd cost, in turns.
+    fn least_costs(&self, progress: &dyn Progress) -> Result<Vec<u32>, Error> {
+        let least = |wanted: &Vec<Feature>| {
+            if progress.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            let costs = IndividualCosts {
+                planner: self,
+                wanted,
+                among: None,
+            };
+            self.search().least_cost(&costs).ok_or(Error::NoTransitions)
+        };
+        self.wanted.par_iter().map(least).collect()
+    }
+
+    /// Returns the search for paths of the film.
     fn search(&self) -> PathSearch<'_> {
         PathSearch {
             trellis: &self.model.trellis,
-            n_frames: self.places.len() + usize::from(!self.ends.is_empty()),
+            n_frames: self.places.len(),
             dwell: self.model.dwell,
+            start: None,
+            end: None,
             cpu: Level::detect(),
-            trace_pool: &self.model.trace_pool,
         }
     }
 
     /// Returns the plan of a path with its cost in parts. The parts are summed from the states; the rest of
     /// the path's cost is the crowd cost.
-    fn costed(&self, path: &Path, wanted: &[Feature], lower_bound: u32) -> Plan {
-        let n_before = self.n_before();
+    fn costed(&self, id: usize, path: &Path, lower_bound: u32) -> Plan {
         let (mut heading, mut speed, mut alone) = (0, 0, 0);
-        let states = &self.states_in_film(path)[n_before..];
-        for (&wanted, &state) in wanted[n_before..].iter().zip(states) {
+        for (&wanted, &state) in self.wanted[id].iter().zip(&path.states) {
             let feature = self.model.features[state as usize];
             let [h, s] = self.model.weights.parts_of(wanted, feature);
             heading += u64::from(h);
@@ -312,7 +314,7 @@ impl<'a> Planner<'a> {
         }
         let [jumps, repetition] = self.jump_costs(path);
         Plan {
-            states: states.to_vec(),
+            states: path.states[..self.places.len()].to_vec(),
             cost: CostParts {
                 heading,
                 speed,
@@ -324,42 +326,6 @@ impl<'a> Planner<'a> {
                 weighs_places: false,
             },
         }
-    }
-
-    /// Returns the cost of a path, given the final plans of others, without the future cost of its last
-    /// state, in turns.
-    fn cost_among(
-        &self,
-        id: usize,
-        wanted: &[Feature],
-        final_plans: &FinalPlans,
-        path: &Path,
-    ) -> u32 {
-        let model = self.model;
-        let n_watched = model.crowd.n_watched(id);
-        let [mut cost, _] = self.jump_costs(path);
-        for (t, &state) in self
-            .states_in_film(path)
-            .iter()
-            .enumerate()
-            .skip(self.n_before())
-        {
-            let places = &self.places[t];
-            let of_one = |other: usize| {
-                let [first, end] = model.alike[final_plans.at(t)[other] as usize];
-                let is_alike = (first..end).contains(&state);
-                is_alike.then(|| model.crowd.cost_at(places.of(id), places.of(other)))
-            };
-            let crowd: u32 = (0..n_watched).filter_map(of_one).sum();
-            let alone = (model.weights).total(wanted[t], model.features[state as usize]);
-            cost += (alone + crowd).min(CEILING - 1);
-        }
-        cost
-    }
-
-    /// Returns the states of a path within the film. A loop's path has one more state.
-    fn states_in_film<'b>(&self, path: &'b Path) -> &'b [u32] {
-        &path.states[..self.places.len()]
     }
 
     /// Returns the cost of a path's jumps, in turns, and the part of it for showing frames again. In a loop

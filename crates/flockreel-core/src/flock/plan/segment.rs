@@ -4,9 +4,10 @@
 //! state adds a future cost F(s) = min over successors s' of (cost of the jump + 0.995 F(s')) (Schoedl et
 //! al., Video Textures, 2000). The plan of a segment is exact with these costs.
 
-use super::conditions::FORBIDDEN;
 use super::trellis::Trellis;
 
+/// Least cost of a plan that is not allowed, in turns. Sums of this and all costs of a plan stay below 2^31.
+pub(super) const FORBIDDEN: u32 = 1 << 28;
 /// Factor by which costs count less per frame in the future. Free choice.
 const DISCOUNT: f64 = 0.995;
 /// Maximum number of iterations of the future cost. A future cost that has not converged by then is

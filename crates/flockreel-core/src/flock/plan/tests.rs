@@ -78,20 +78,30 @@ fn part_of_the_cost_without_its_weight_is_zero() {
     }
 }
 
-/// Returns the least cost of all paths, in turns, by trying all of them. A path begins with any state at
-/// frame 0 and then plays on or jumps.
-fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u32>) -> u32 {
+/// Returns the least cost of all paths of the first individual, in turns, by trying all of them. Outside of a
+/// loop a path begins with any state and then plays on or jumps.
+fn least_by_brute_force(planner: &Planner, path: &mut Vec<u32>) -> u32 {
     let ends = planner.ends.first();
-    if path.len() == wanted.len() + planner.ends.len() {
+    if path.len() == planner.places.len() + planner.ends.len() {
         if ends.is_some_and(|ends| path.last() != Some(&ends.next)) {
             return u32::MAX;
         }
-        let final_plans = FinalPlans::new(planner.places.len());
-        let path = viterbi::Path {
+        let wanted = &planner.wanted[0][..];
+        let costs = IndividualCosts {
+            planner,
+            wanted,
+            among: None,
+        };
+        let shown = path
+            .iter()
+            .enumerate()
+            .map(|(t, &state)| costs.at(t, state as usize))
+            .sum::<u32>();
+        let path = Path {
             states: path.clone(),
             cost: 0,
         };
-        return planner.cost_among(0, wanted, &final_plans, &path);
+        return shown + planner.jump_costs(&path)[0];
     }
     let trellis = &planner.model.trellis;
     let states = 0..trellis.n_states() as u32;
@@ -117,7 +127,7 @@ fn least_by_brute_force(planner: &Planner, wanted: &[Feature], path: &mut Vec<u3
     };
     let least = next.into_iter().map(|state| {
         path.push(state);
-        let least = least_by_brute_force(planner, wanted, path);
+        let least = least_by_brute_force(planner, path);
         path.pop();
         least
     });
@@ -144,8 +154,7 @@ fn plan_is_the_cheapest_and_the_jump_back_cost_reduces_repeats() {
         let motion = motion_of(&library, &Lens::new(&library, &aware.params));
         let model = Model::new(&library, &motion, &aware.params);
         let planner = Planner::new(&model, &boids);
-        let wanted = planner.model.weights.wanted(&boids[0], planner.model.fps);
-        let least = least_by_brute_force(&planner, &wanted, &mut Vec::new());
+        let least = least_by_brute_force(&planner, &mut Vec::new());
         let stored = (aware.individuals[0].cost.total * Turns::PER_RAD).round() as u32;
         assert_eq!(stored, least, "seed {seed}");
         n_again += aware.stats.repeats_per_100_frames;
@@ -176,16 +185,14 @@ fn loop_plan_is_the_cheapest_that_leads_to_its_continuation() {
         let motion = motion_of(&library, &Lens::new(&library, &flock.params));
         let model = Model::new(&library, &motion, &flock.params);
         let mut planner = Planner::new(&model, &boids);
-        let wanted = [planner.model.weights.wanted(&boids[0], planner.model.fps)];
         let own = (one.source_frame[0], one.mirrored[0]);
         // Frame 200 is the first of the component: only jumps lead to it.
         for (frame, side) in [own, (200, false)] {
             let first = planner.model.trellis.state(frame, side);
             let first = first.expect("a frame of the component");
             planner.ends = vec![LoopEnds { first, next: first }];
-            let mut final_plans = FinalPlans::new(planner.places.len());
-            let found = planner.paths(&wanted, &mut final_plans, &Silent).unwrap();
-            let least = least_by_brute_force(&planner, &wanted[0], &mut Vec::new());
+            let found = planner.paths(&Silent).unwrap();
+            let least = least_by_brute_force(&planner, &mut Vec::new());
             assert_eq!(found[0].cost, least, "seed {seed}");
             if (frame, side) == own {
                 let stored = (one.cost.total * Turns::PER_RAD).round() as u32;

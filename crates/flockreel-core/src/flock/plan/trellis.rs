@@ -4,7 +4,6 @@
 //! and jumps are sorted by their target. A barrier state precedes each run. No step leaves a barrier, so
 //! playing on always leads from the state before.
 
-use super::landings::{Landings, Pass};
 use crate::library::{Jump, Playback};
 
 /// Frame number of a barrier.
@@ -21,19 +20,14 @@ pub struct Trellis {
     n_unmirrored: usize,
     /// Run to which each state belongs.
     runs: Vec<u32>,
-    /// Number of states of its run up to each state, itself included; 0 for barriers.
-    lengths_forward: Vec<u32>,
-    /// Number of states of its run from each state on, itself included; 0 for barriers. The last state
-    /// comes first.
-    lengths_backward: Vec<u32>,
+    /// Barriers, rising.
+    barriers: Vec<u32>,
     /// States at which jumps land, rising.
     targets: Vec<u32>,
     /// `sources[first_source[k]..first_source[k + 1]]` are the jumps to target k.
     first_source: Vec<u32>,
     /// (source state, cost in turns) of each jump, by target, then by source.
     sources: Vec<(u32, u32)>,
-    forward: Landings,
-    backward: Landings,
 }
 
 impl Trellis {
@@ -46,19 +40,15 @@ impl Trellis {
             unmirrored: Vec::new(),
             n_unmirrored: 0,
             runs: Vec::new(),
-            lengths_forward: Vec::new(),
-            lengths_backward: Vec::new(),
+            barriers: Vec::new(),
             targets: Vec::new(),
             first_source: vec![0],
             sources: Vec::new(),
-            forward: Landings::default(),
-            backward: Landings::default(),
         };
         let sides: &[bool] = if mirror { &[false, true] } else { &[false] };
         for &side in sides {
             trellis.add_side(&playback.component, side);
         }
-        trellis.count_runs();
         let mut jumps: Vec<(u32, u32, u32)> = Vec::new();
         for jump in &playback.jumps {
             for &side in sides {
@@ -109,6 +99,20 @@ impl Trellis {
         &self.sources[range]
     }
 
+    /// Returns each target with the jumps to it: (source state, cost in turns).
+    #[inline]
+    pub fn jumps(&self) -> impl Iterator<Item = (u32, &[(u32, u32)])> {
+        let mut first = 0;
+        self.targets
+            .iter()
+            .zip(&self.first_source[1..])
+            .map(move |(&target, &end)| {
+                let jumps = &self.sources[first..end as usize];
+                first = end as usize;
+                (target, jumps)
+            })
+    }
+
     /// Returns the cost of the jump from a state to another, in turns; 0 if there is none.
     pub fn jump_cost(&self, from: u32, to: u32) -> u32 {
         let k = self.targets.binary_search(&to);
@@ -117,21 +121,9 @@ impl Trellis {
         at.map_or(0, |at| sources[at].1)
     }
 
-    /// Returns the jumps from station to station, in one direction of time.
-    pub fn landings(&self, pass: Pass) -> &Landings {
-        match pass {
-            Pass::Forward => &self.forward,
-            Pass::Backward => &self.backward,
-        }
-    }
-
-    /// Returns for each station the number of states of its run up to it, itself included, in one direction
-    /// of time; 0 for barriers.
-    pub fn run_lengths(&self, pass: Pass) -> &[u32] {
-        match pass {
-            Pass::Forward => &self.lengths_forward,
-            Pass::Backward => &self.lengths_backward,
-        }
+    /// Returns the barriers, rising.
+    pub fn barriers(&self) -> impl Iterator<Item = usize> {
+        self.barriers.iter().map(|&state| state as usize)
     }
 
     /// Returns whether playing on from `state` leads to `state + ahead` without a jump.
@@ -145,6 +137,7 @@ impl Trellis {
         for &frame in component {
             if last.is_none_or(|last: u32| last + 1 != frame) {
                 let run = self.runs.last().map_or(0, |run| run + 1);
+                self.barriers.push(self.frames.len() as u32);
                 self.frames.push(NO_FRAME);
                 self.mirrored.push(side);
                 self.runs.push(run);
@@ -162,28 +155,9 @@ impl Trellis {
         }
     }
 
-    fn count_runs(&mut self) {
-        let count = |count: &mut u32, frame: u32| {
-            *count = if frame == NO_FRAME { 0 } else { *count + 1 };
-            *count
-        };
-        let (mut since, mut until) = (0, 0);
-        self.lengths_forward = self.frames.iter().map(|&f| count(&mut since, f)).collect();
-        self.lengths_backward = (self.frames.iter().rev())
-            .map(|&f| count(&mut until, f))
-            .collect();
-    }
-
     fn add_jumps(&mut self, mut jumps: Vec<(u32, u32, u32)>) {
         jumps.sort_unstable();
         jumps.dedup_by_key(|jump| (jump.0, jump.1));
-        self.forward = Landings::new(self.n_states(), &jumps);
-        let station = |state| Pass::Backward.station(self.n_states(), state as usize) as u32;
-        let mut backward: Vec<_> = (jumps.iter())
-            .map(|&(to, from, cost)| (station(from), station(to), cost))
-            .collect();
-        backward.sort_unstable();
-        self.backward = Landings::new(self.n_states(), &backward);
         for (target, source, cost) in jumps {
             if self.targets.last() != Some(&target) {
                 self.targets.push(target);

@@ -2,8 +2,6 @@
 
 use proptest::prelude::*;
 
-use std::sync::LazyLock;
-
 use super::*;
 use crate::flock::check::optimum::{Edge, Graph, NEVER};
 use crate::library::{Jump, Playback};
@@ -29,18 +27,14 @@ impl Case {
     }
 
     fn search<'a>(&self, trellis: &'a Trellis, cpu: Level) -> PathSearch<'a> {
-        static TRACE_POOL: LazyLock<TracePool> = LazyLock::new(TracePool::default);
         PathSearch {
-            trace_pool: &TRACE_POOL,
             trellis,
             n_frames: self.n_frames,
             dwell: self.dwell,
+            start: None,
+            end: None,
             cpu,
         }
-    }
-
-    fn state_costs(&self) -> impl StateCosts + Clone + Send + Sync {
-        |t: usize, state: usize| self.cost(t, state)
     }
 
     fn plan(&self) -> Option<Path> {
@@ -50,7 +44,15 @@ impl Case {
     fn plan_at(&self, cpu: Level, segment: usize) -> Option<Path> {
         let trellis = self.trellis();
         let search = self.search(&trellis, cpu);
-        search.cheapest_path_by_segments(&self.state_costs(), segment)
+        search.cheapest_path_by_segments(self, segment, &mut Vec::new())
+    }
+
+    /// Returns the least cost over all paths between two states, by trying all of them. The first counts as just
+    /// jumped to.
+    fn between(&self, first: usize, end: u32) -> Option<u64> {
+        let trellis = self.trellis();
+        let is_end = |state: usize| state == end as usize;
+        self.cheapest_from(&trellis, (0, first, 1), &is_end)
     }
 
     /// Returns the least cost of a plan by the oracle of `flock::check`.
@@ -107,14 +109,20 @@ impl Case {
         let states = 0..trellis.n_states();
         states
             .filter(|&state| trellis.shown(state).is_some())
-            .filter_map(|state| self.cheapest_from(&trellis, 0, state, self.dwell))
+            .filter_map(|state| self.cheapest_from(&trellis, (0, state, self.dwell), &|_| true))
             .min()
     }
 
-    fn cheapest_from(&self, trellis: &Trellis, t: usize, state: usize, run: usize) -> Option<u64> {
+    /// Returns the least cost from a state on at a frame, `run` frames after a jump.
+    fn cheapest_from(
+        &self,
+        trellis: &Trellis,
+        (t, state, run): (usize, usize, usize),
+        is_end: &impl Fn(usize) -> bool,
+    ) -> Option<u64> {
         let here = u64::from(self.cost(t, state));
         if t + 1 == self.n_frames {
-            return Some(here);
+            return is_end(state).then_some(here);
         }
         let mut best = None;
         let mut offer = |rest: Option<u64>, step: u32| {
@@ -122,18 +130,34 @@ impl Case {
             best = [best, cost].into_iter().flatten().min();
         };
         if trellis.continues(state, 1) {
-            offer(self.cheapest_from(trellis, t + 1, state + 1, run + 1), 0);
+            offer(
+                self.cheapest_from(trellis, (t + 1, state + 1, run + 1), is_end),
+                0,
+            );
         }
         if run >= self.dwell {
             for (k, &target) in trellis.targets().iter().enumerate() {
                 for &(source, cost) in trellis.sources(k) {
                     if source as usize == state {
-                        offer(self.cheapest_from(trellis, t + 1, target as usize, 1), cost);
+                        offer(
+                            self.cheapest_from(trellis, (t + 1, target as usize, 1), is_end),
+                            cost,
+                        );
                     }
                 }
             }
         }
         best
+    }
+}
+
+impl StateCosts for Case {
+    fn fill(&self, t: usize, out: &mut [u32]) {
+        (out.iter_mut().enumerate()).for_each(|(state, out)| *out = self.cost(t, state));
+    }
+
+    fn at(&self, t: usize, state: usize) -> u32 {
+        self.cost(t, state)
     }
 }
 
@@ -174,14 +198,25 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 10_000, ..ProptestConfig::default() })]
 
     #[test]
-    fn costs_from_a_state_are_those_of_the_cheapest_path_that_begins_with_it(case in case(7, 9)) {
+    fn path_between_two_states_is_the_cheapest(mut case in case(7, 9), ends in any::<[usize; 2]>()) {
+        case.n_frames = case.n_frames.max(case.dwell + 1);
         let trellis = case.trellis();
-        let costs = case.search(&trellis, Level::detect()).costs_from(&mut case.state_costs());
-        for (state, &found) in costs.iter().enumerate() {
-            let is_shown = trellis.shown(state).is_some();
-            let least = is_shown.then(|| case.cheapest_from(&trellis, 0, state, 1)).flatten();
-            let found = (found < UNREACHED).then_some(u64::from(found));
-            prop_assert_eq!(found, least, "{}", state);
+        let n_states = trellis.n_states();
+        let shown: Vec<usize> = (0..n_states).filter(|&state| trellis.shown(state).is_some()).collect();
+        prop_assume!(!shown.is_empty());
+        let [first, end] = ends.map(|k| shown[k % shown.len()]);
+        let end = end as u32;
+        let mut start = vec![FORBIDDEN; n_states];
+        start[first] = 0;
+        let search = PathSearch { start: Some(&start), ..case.search(&trellis, Level::detect()) };
+        let least = case.between(first, end);
+        let to = search.costs_to(&case)[end as usize];
+        prop_assert_eq!((to < UNREACHED).then_some(u64::from(to)), least);
+        let path = PathSearch { end: Some(end), ..search }.cheapest_path(&case, &mut Vec::new());
+        prop_assert_eq!(path.as_ref().map(|path| u64::from(path.cost)), least);
+        if let Some(path) = path {
+            let ends = [path.states.first(), path.states.last()];
+            prop_assert_eq!(ends, [Some(&(first as u32)), Some(&end)]);
         }
     }
 
@@ -213,7 +248,7 @@ proptest! {
         let trellis = case.trellis();
         let search = case.search(&trellis, Level::detect());
         let cost = whole.map(|path| path.cost);
-        prop_assert_eq!(search.least_cost(&mut case.state_costs()), cost);
+        prop_assert_eq!(search.least_cost(&case), cost);
     }
 
     #[test]
