@@ -155,8 +155,8 @@ impl World<'_> {
         }
     }
 
-    /// Returns the cost of a place, radians.
-    pub(super) fn cost(&self, place: Place, around: &Surroundings) -> f64 {
+    /// Returns the cost of a place that is `beyond_bl` beyond the walls, radians.
+    pub(super) fn cost(&self, place: Place, beyond_bl: f64, around: &Surroundings) -> f64 {
         let length_px = self.placer.lens.length_px;
         let [x, y] = place.centroid_px;
         let distance_bl = |[px, py]: [f64; 2]| (x - px).hypot(y - py) / length_px;
@@ -170,7 +170,7 @@ impl World<'_> {
             None => COST_OF_GAP * (distance_bl(around.goal_px) - SLACK_BL).max(0.0),
         };
         own + COST_OF_OVERLAP * overlaps.sum::<f64>()
-            + COST_BEYOND * around.beyond_bl(place.centroid_px).max(0.0)
+            + COST_BEYOND * beyond_bl.max(0.0)
             + self.home_range.cost(place.centroid_px)
     }
 

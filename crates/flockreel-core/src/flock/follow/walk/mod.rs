@@ -24,6 +24,8 @@ const CELL_BL: f64 = 0.3;
 const HEADINGS_PER_RAD: f64 = 6.0;
 /// Number of entries of the table of cells. Two cells with the same entry count as one.
 const N_ENTRIES: usize = 1 << 10;
+/// Number of frames with which a walk may begin, spread over the film. Free choice.
+const N_STARTS: usize = 512;
 /// Top view: time between two choices of the steering, seconds. Free choice.
 const STEERING_S: f64 = 0.2;
 /// Top view: cost of turning by a radian more than filmed, radians. Free choice.
@@ -54,6 +56,8 @@ pub(super) struct Node {
     centroid_px: [f64; 2],
     /// Top view: whether the individual turns left (-1) or right (1) beside the filmed turns.
     steering: i8,
+    /// Distance beyond the walls, body lengths; negative inside.
+    beyond_bl: f64,
     is_clipped: bool,
     /// Cost up to this frame, and of what lies ahead, in turns.
     cost: u64,
@@ -71,6 +75,7 @@ impl Node {
             heading_rad,
             centroid_px,
             steering: 0,
+            beyond_bl: 0.0,
             is_clipped: false,
             cost: 0,
             ahead: 0,
@@ -168,7 +173,7 @@ impl<'a> Walker<'a> {
         first: usize,
     ) -> Option<Walk> {
         let (begun, rest) = match start {
-            Some(start) => (vec![start], moments),
+            Some(start) => (vec![Self::among_walls(start, moments.first()?)], moments),
             None => (self.starts(moments.first()?), &moments[1..]),
         };
         let mut table = vec![u32::MAX; N_ENTRIES];
@@ -201,13 +206,14 @@ impl<'a> Walker<'a> {
         })
     }
 
-    /// Returns the nodes with which a walk may begin: each frame from which playback can continue. It begins
+    /// Returns the nodes with which a walk may begin: frames from which playback can continue. It begins
     /// at its boid in a school that has room to form, else at the filmed place.
     fn starts(&self, moment: &Moment) -> Vec<Node> {
         let placer = self.placer;
         let is_social = placer.params.rules.sociality != Some(0.0);
         let forms = is_social && self.world.radius_scale >= 1.0;
-        let states = 0..self.model.trellis.n_states() as u32;
+        let n_states = self.model.trellis.n_states();
+        let states = (0..n_states as u32).filter(|&state| self.model.is_endless(state));
         let node = |state| {
             let shown = self.model.trellis.shown(state as usize)?;
             let rotation = match placer.library.poses.view {
@@ -223,10 +229,19 @@ impl<'a> Walker<'a> {
             };
             let place = place.map(|px| rounded(px, 2));
             let node = Node::new(state, self.model.dwell, heading_rad, place);
+            let node = Self::among_walls(node, moment);
             Some(self.settled(node, moment, 0))
         };
-        let endless = states.filter(|&state| self.model.is_endless(state));
-        endless.filter_map(node).collect()
+        states
+            .step_by(n_states.div_ceil(N_STARTS))
+            .filter_map(node)
+            .collect()
+    }
+
+    /// Returns a node with its distance from the walls.
+    fn among_walls(node: Node, moment: &Moment) -> Node {
+        let beyond_bl = moment.around.beyond_bl(node.centroid_px);
+        Node { beyond_bl, ..node }
     }
 
     /// Adds the nodes that may follow a node.
@@ -291,7 +306,7 @@ impl<'a> Walker<'a> {
             scale: self.placer.scale(frame, moment.depth_bl, self.size),
         };
         let steered_rad = self.steered_rad(&node, frame).abs();
-        let rad = self.world.cost(place, &moment.around)
+        let rad = self.world.cost(place, node.beyond_bl, &moment.around)
             + COST_OF_STEERING * steered_rad
             + self.course_weight * wrap_rad(node.heading_rad - moment.heading_rad).abs();
         let turns = heading + speed + jump + alike;

@@ -47,11 +47,12 @@ impl Walker<'_> {
             let correction = self.correction_px(&node, stepped, step, moment);
             place = [0, 1].map(|axis| place[axis] + correction[axis]);
         }
-        let [last, beyond] =
-            [before.centroid_px, place].map(|place| moment.around.beyond_bl(place));
-        node.is_clipped = beyond > MAX_BEYOND_BL.max(last);
+        let last = before.beyond_bl;
+        node.beyond_bl = moment.around.beyond_bl(place);
+        node.is_clipped = node.beyond_bl > MAX_BEYOND_BL.max(last);
         if node.is_clipped {
-            let share = ((MAX_BEYOND_BL - last) / (beyond - last)).clamp(0.0, 1.0);
+            let share = ((MAX_BEYOND_BL - last) / (node.beyond_bl - last)).clamp(0.0, 1.0);
+            node.beyond_bl = MAX_BEYOND_BL.max(last);
             let along = |axis: usize| {
                 before.centroid_px[axis] + share * (place[axis] - before.centroid_px[axis])
             };
