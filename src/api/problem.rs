@@ -217,6 +217,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         | Code::AnimalTooSmall
         | Code::BackgroundSizeDiffers
         | Code::NoTransitions
+        | Code::StaysInPlace
         | Code::InputFailed
         | Code::IdempotencyKeyReused
         | Code::InvalidParams => StatusCode::UNPROCESSABLE_ENTITY,

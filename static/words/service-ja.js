@@ -27,6 +27,7 @@ export default {
   "code.several_animals": "複数の動物が動いています。", "code.several_animals.advice": "鏡像も映らないように、動物を1個体だけ撮影してください。または、最も大きい動物を追跡してください。",
   "code.animal_too_small": "画面の動物が小さすぎます。", "code.animal_too_small.advice": "もっと近くから、または、より高い解像度で撮影してください。",
   "code.no_transitions": "無限に再生できるほど、よく似た時点がありません。", "code.no_transitions.advice": "動物が似た姿勢に戻るように、もっと長く撮影してください。",
+  "code.stays_in_place": "動物が一か所にとどまっているため、群れの全個体が同じ場所に重なってしまいます。", "code.stays_in_place.advice": "動き回る様子を撮影するか、1個体だけの群れを作ってください。",
   "code.input_failed": "このジョブの入力がありません。入力を作るジョブが失敗したか、入力が削除されました。", "code.input_failed.advice": "失敗したジョブの原因を解消するか、入力を送り直して、もう一度試してください。",
   "code.crashed_worker": "このジョブが原因とみられる異常終了が3回起きたため、自動では再開しません。", "code.crashed_worker.advice": "別の設定か別の動画で試し、管理者に連絡してください。",
   "code.already_stored": "同じ動画がすでに登録されています。", "code.already_stored.advice": "登録済みの動画を使ってください。",

@@ -116,6 +116,9 @@ codes! {
     // Flocks.
     NoTransitions "no_transitions" "The footage has too few similar moments for endless playback."
         "Film for longer, so that the animal returns to similar poses."
+    StaysInPlace "stays_in_place" "The animal stays at one place in the film, so all of a flock would be there."
+        "Film the animal while it moves about. Or ask for a flock of one, or for `position: boid`, which moves it as no \
+         film shows it."
     // All jobs and uploads.
     InputFailed "input_failed" "The film or library for this job is missing: it was deleted, or the job that should \
                                 have made it failed or was cancelled."

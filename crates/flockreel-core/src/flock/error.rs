@@ -11,6 +11,12 @@ pub enum Error {
          returns to the same poses"
     )]
     NoTransitions,
+    /// The animal stays at one place, and several of it are asked for at filmed places.
+    #[error(
+        "the animal stays at one place in the film, so all of a flock would be there: film it while it moves about, or \
+         ask for a flock of one"
+    )]
+    StaysInPlace,
     /// The library has no sprites, because the animal covers too few pixels.
     #[error(
         "the animal is too small in the picture: film from a shorter distance, or analyze again with sprites set to \
@@ -36,6 +42,7 @@ impl Error {
     pub fn code(&self) -> Code {
         match self {
             Error::NoTransitions => Code::NoTransitions,
+            Error::StaysInPlace => Code::StaysInPlace,
             Error::AnimalTooSmall => Code::AnimalTooSmall,
             Error::InvalidParams(_) | Error::LoopDoesNotClose(_) => Code::InvalidParams,
             Error::Cancelled => Code::Cancelled,

@@ -46,8 +46,14 @@ use self::placement::{Placed, Placer};
 use self::plan::{Model, Plan, Planner};
 use crate::geometry::rounded;
 use crate::library::{Library, View};
+use crate::order::median;
 use crate::parameters::Parameters;
 use crate::progress::{CancelOnly, Progress};
+
+/// Share of the frames, and distance from the middle of all places, body lengths, within which an animal stays at
+/// one place. Free choices.
+const STAYS_SHARE: f64 = 0.95;
+const STAYS_BL: f64 = 0.25;
 
 /// A simulated, planned and placed flock, without its pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +99,7 @@ impl Flock {
 /// Simulates, plans and places a flock of the library's animal.
 ///
 /// Fails if a parameter is out of range or the job is cancelled. Also fails if the animal is too small for
-/// sprites, the library has no jumps, or a loop does not close.
+/// sprites or stays at one place, the library has no jumps, or a loop does not close.
 pub fn plan_flock(
     library: &Library,
     params: &Params,
@@ -108,6 +114,10 @@ pub fn plan_flock(
     }
     let (mut params, support) = resolved(params, library);
     let lens = Lens::new(library, &params);
+    let is_film = params.position == Position::Film;
+    if is_film && params.count != Some(1) && stays_in_place(library, lens.length_px) {
+        return Err(Error::StaysInPlace);
+    }
     let motion = motion_of(library, &lens);
     let tank = Tank::from_library(library, &lens, &motion, &params);
     let stands = (support.iter()).map(|support| support.capacity(CLEAR_BL * lens.length_px));
@@ -159,6 +169,14 @@ pub fn plan_flock(
         predator_px: course.predator_px,
         individuals,
     })
+}
+
+/// Returns whether the animal was nearly always at one place.
+fn stays_in_place(library: &Library, length_px: f64) -> bool {
+    let places: Vec<[f64; 2]> = library.places_px().collect();
+    let middle = [0, 1].map(|k| median(places.iter().map(|place| place[k])).unwrap_or_default());
+    let is_near = |[x, y]: &&[f64; 2]| (x - middle[0]).hypot(y - middle[1]) < STAYS_BL * length_px;
+    places.iter().filter(is_near).count() as f64 >= STAYS_SHARE * places.len() as f64
 }
 
 /// Returns the quality measures of a flock, all but `room_for`.

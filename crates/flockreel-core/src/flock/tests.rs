@@ -375,6 +375,30 @@ fn a_library_without_jumps_is_refused_with_advice() {
 }
 
 #[test]
+fn a_flock_of_an_animal_that_stays_in_place_is_refused() {
+    let mut library = synthetic::library(View::Side);
+    for (frame, pose) in library.poses.frames.iter_mut().enumerate() {
+        let sway_px = 3.0 * libm::sin(frame as f64);
+        pose.centroid_px = pose.centroid_px.map(|_| [90.0 + sway_px, 70.0]);
+    }
+    let plan = |count, position| {
+        let params = Params {
+            count,
+            position,
+            frames: 40,
+            ..params("school")
+        };
+        plan_flock(&library, &params, &Silent)
+    };
+    for count in [None, Some(2)] {
+        let error = plan(count, Position::Film).expect_err("all at one place");
+        assert_eq!(error.code(), crate::code::Code::StaysInPlace);
+    }
+    plan(Some(1), Position::Film).expect("one");
+    plan(Some(2), Position::Boid).expect("boids move them");
+}
+
+#[test]
 fn an_animal_too_small_for_sprites_is_refused_with_advice() {
     let mut library = synthetic::library(View::Side);
     library.stats.animal_too_small = true;
