@@ -13,7 +13,7 @@ use crate::library::Library;
 /// Distance below which another animal is too near, body lengths. Free choice.
 pub(in crate::flock) const CLEAR_BL: f64 = 0.9;
 /// Cost of a frame at the same place as another animal, radians. Free choice.
-const COST_OF_OVERLAP: f64 = 1.0;
+const COST_OF_OVERLAP: f64 = 3.0;
 /// Distance from the boid that costs nothing, body lengths, and cost of a frame for each body length beyond,
 /// radians. Free choices.
 const SLACK_BL: f64 = 1.0;
