@@ -7,6 +7,9 @@ use sqlx::types::Uuid;
 use super::Lease;
 use crate::store::{Error, Store, sql};
 
+/// Time in the queue after which a job is late, milliseconds. Free choice.
+const LATE_MS: i64 = 600_000;
+
 /// The jobs that a worker runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lane {
@@ -31,7 +34,9 @@ impl Store {
     /// one is ready when that one is done.
     ///
     /// Order of the jobs: owners with fewer running jobs first, then higher priority, then owners whose last
-    /// job started longer ago, then small jobs, then older ones.
+    /// job started longer ago. Among the jobs of one owner small films go first, since a person waits for them,
+    /// then small measurements, then the others; older ones before later ones. Every second start goes to the
+    /// oldest job, if that is late, so that no job waits for ever.
     pub async fn claim_in(
         &self,
         lane: Lane,
@@ -40,10 +45,11 @@ impl Store {
         lease_ms: i64,
     ) -> Result<Option<Lease>, Error> {
         let lease: Option<Lease> = sql::query(
-            "with turns (owner, n_running, last_ms) as ( \
+            "with turns (owner, n_running, last_ms, n_started) as ( \
                  select owner, (select count(*) from jobs r \
                                 where r.owner = q.owner and r.state = 'running'), \
-                        (select max(started_ms) from jobs s where s.owner = q.owner) \
+                        (select max(started_ms) from jobs s where s.owner = q.owner), \
+                        (select count(started_ms) from jobs s where s.owner = q.owner) \
                  from (select distinct owner from jobs where state = 'queued') q) \
              update jobs set state = 'running', fence = fence + 1, attempt = attempt + 1, \
              worker = $1, lease_until_ms = $3, started_ms = coalesce(started_ms, $2), \
@@ -53,7 +59,10 @@ impl Store {
                  where j.state = 'queued' and j.run_at_ms <= $2 and (j.small or not $4) \
                  and (j.after_job is null \
                       or exists (select 1 from jobs a where a.id = j.after_job and a.state = 'done')) \
-                 order by t.n_running, j.priority desc, coalesce(t.last_ms, 0), j.small desc, j.id limit 1 for update of j skip locked) \
+                 order by t.n_running, j.priority desc, coalesce(t.last_ms, 0), \
+                 case when t.n_started % 2 = 1 and j.created_ms <= $5 then 0 \
+                      when j.small and j.kind <> 'analysis' then 1 when j.small then 2 else 3 end, \
+                 j.id limit 1 for update of j skip locked) \
              returning id as job_id, kind, input, result_id, attempt, fence, own_crashes, transient_ends, \
              traceparent",
         )
@@ -61,6 +70,7 @@ impl Store {
         .bind(now_ms)
         .bind(now_ms + lease_ms)
         .bind(lane == Lane::Short)
+        .bind(now_ms - LATE_MS)
         .fetch_optional(&self.writer)
         .await?;
         if let Some(lease) = &lease {

@@ -74,13 +74,52 @@ async fn quota_limits_queued_and_running_jobs() {
 
 impl Queue {
     async fn enqueue_small(&self, owner: &str) -> JobId {
+        self.enqueue_as(owner, Kind::Fish, true, 0).await
+    }
+
+    async fn enqueue_as(&self, owner: &str, kind: Kind, is_small: bool, now_ms: i64) -> JobId {
         let job = NewJob {
-            is_small: true,
-            ..new_job(of(owner, 9))
+            is_small,
+            kind,
+            ..new_job(of(owner, 99))
         };
-        self.store.enqueue(&job, 0).await.unwrap();
+        self.store.enqueue(&job, now_ms).await.unwrap();
         job.job_id
     }
+
+    /// Claims and ends the next job.
+    async fn run_next(&self, now_ms: i64) -> JobId {
+        let lease = self.claim(now_ms).await.unwrap();
+        let end = self.store.fail(&lease, Code::NotAVideo, "it is no film", None, now_ms);
+        assert_eq!(end.await.unwrap(), Change::Made);
+        lease.job_id
+    }
+}
+
+#[tokio::test]
+async fn a_film_goes_before_ten_measurements_of_its_owner() {
+    let queue = Queue::open().await;
+    for _ in 0..10 {
+        queue.enqueue_as("a", Kind::Analysis, true, 0).await;
+    }
+    for now_ms in [1, 2] {
+        let film = queue.enqueue_as("a", Kind::Flock, true, now_ms).await;
+        assert_eq!(queue.run_next(now_ms).await, film);
+    }
+}
+
+#[tokio::test]
+async fn late_jobs_get_every_second_start() {
+    let queue = Queue::open().await;
+    let large = queue.enqueue_as("a", Kind::Flock, false, 0).await;
+    let measurement = queue.enqueue_as("a", Kind::Analysis, true, 1).await;
+    let mut turns = Vec::new();
+    for start in 0..4 {
+        let now_ms = 700_000 + start;
+        queue.enqueue_as("a", Kind::Flock, true, now_ms).await;
+        turns.push(queue.run_next(now_ms).await);
+    }
+    assert_eq!([turns[1], turns[3]], [large, measurement]);
 }
 
 #[tokio::test]
