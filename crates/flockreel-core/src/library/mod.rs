@@ -3,13 +3,16 @@
 //! The types here are plain values without I/O. `formats` writes and reads them (docs/reference/formats.md,
 //! "library.json").
 
+pub mod motion;
 mod part;
 pub mod playback;
 pub mod pose;
+pub mod scale;
 pub mod sprites;
 
 pub use playback::{Jump, Patch, Playback, Transition};
 pub use pose::{Animal, BeatSpan, Pose, Poses, RawPose, TailBeat, TailBeatMethod, View};
+pub use scale::{Scale, ScaleError};
 pub use sprites::{Matte, Sprites};
 
 use crate::geometry::Rect;
