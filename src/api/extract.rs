@@ -7,6 +7,7 @@ use axum::extract::{self, FromRequest, FromRequestParts, Path, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, Method};
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer};
 use uuid::Uuid;
 
 use super::access::Caller;
@@ -156,6 +157,13 @@ impl<S: Send + Sync> FromRequestParts<S> for Conditions {
             headers: parts.headers.clone(),
         })
     }
+}
+
+/// Reads a property that is given, so that it differs from an absent one. Fails for null if `T` does.
+pub(super) fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(
+    json: D,
+) -> Result<Option<T>, D::Error> {
+    T::deserialize(json).map(Some)
 }
 
 fn code_of(rejection: &JsonRejection) -> Code {

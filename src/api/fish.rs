@@ -153,7 +153,7 @@ pub(super) async fn change_fish(
     Id(id): Id,
     Json(change): Json<ResultChange>,
 ) -> JsonAnswer<FishView> {
-    access.change_result(id, change).await
+    access.change_result(id, &change.properties()).await
 }
 
 /// Delete a virtual fish and its job.

@@ -6,14 +6,14 @@
 use axum::extract::Request;
 use axum::http::{StatusCode, header};
 use axum::response::IntoResponse;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 use uuid::Uuid;
 
 use super::AppState;
 use super::download::names::{saved_as, stem};
 use super::download::{Download, disposition};
-use super::extract::{Access, Conditions, Id, Json, Query};
+use super::extract::{Access, Conditions, Id, Json, Query, given};
 use super::paging::{Filtered, FootageQuery, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::receive::{label, receive};
@@ -69,11 +69,6 @@ pub(super) struct FootageChange {
     #[serde(default, deserialize_with = "given")]
     #[schema(value_type = bool, required = false)]
     pinned: Option<bool>,
-}
-
-/// Reads a property that is given. Fails for null.
-fn given<'de, T: Deserialize<'de>, D: Deserializer<'de>>(json: D) -> Result<Option<T>, D::Error> {
-    T::deserialize(json).map(Some)
 }
 
 /// Query parameters of an upload.

@@ -45,12 +45,19 @@ pub(super) trait ResultView: View {
     fn with_files(self, files: Vec<FileView>) -> Self;
 }
 
-/// New properties of a library, flock or virtual fish.
+/// New properties of a flock or virtual fish.
 #[derive(Clone, Copy, Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ResultChange {
     /// Whether it stays even if nobody uses it.
     pinned: bool,
+}
+
+impl ResultChange {
+    /// Returns the changed properties.
+    pub(super) fn properties(self) -> [Property<'static>; 1] {
+        [Property::Pinned(self.pinned)]
+    }
 }
 
 /// A file that can be downloaded from below the address of its resource.
@@ -154,14 +161,13 @@ impl Access {
         Ok(axum::Json(V::from_row(row)?.with_files(files)))
     }
 
-    /// Changes a result and returns it with the list of its files.
+    /// Changes properties of a result and returns it with the list of its files.
     pub(super) async fn change_result<V: ResultView>(
         &self,
         id: Uuid,
-        change: ResultChange,
+        properties: &[Property<'_>],
     ) -> JsonAnswer<V> {
-        self.change::<V::Stored>(id, &[Property::Pinned(change.pinned)])
-            .await?;
+        self.change::<V::Stored>(id, properties).await?;
         self.get_result(id).await
     }
 

@@ -1,7 +1,7 @@
 //! The command line: one file per command (docs/reference/command-line.md).
 //!
 //! Results go to files, progress and errors to stderr. `--json` prints one line of JSON to stdout. `token`,
-//! `gc` and `doctor` print to stdout in any case. Exit status: 0 for success, 2 for bad usage or bad input, 1
+//! `gc`, `doctor` and `summary` print to stdout in any case. Exit status: 0 for success, 2 for bad usage or bad input, 1
 //! for an internal failure.
 
 pub mod analyze;
@@ -15,12 +15,11 @@ pub mod error;
 pub mod fish;
 pub mod flock;
 pub mod gc;
-pub mod matrix;
+pub mod library;
 pub mod progress;
 pub mod sample;
 pub mod serve;
 pub mod set;
-pub mod sprites;
 pub mod token;
 pub mod worker;
 
@@ -96,6 +95,12 @@ enum Command {
     Backup(backup::Args),
     /// Measure the animal in a video and write a library.
     Analyze(analyze::Args),
+    /// Set the scale of a library, for results in centimetres. Nothing is measured again.
+    Scale(library::scale::Args),
+    /// Write place, speed and size of the animal in every frame, in centimetres if the library has a scale.
+    Motion(library::motion::Args),
+    /// Print distance, speeds, rest and turns of films as CSV, one row each.
+    Summary(library::summary::Args),
     /// Make a flock from a library and write it as a video.
     Flock(flock::Args),
     /// Check the plan of a flock: every step, every cost, and that no cheaper plan exists.
@@ -103,9 +108,9 @@ enum Command {
     /// Make a virtual fish that swims like the animal, as a video or a 3-D model.
     Fish(fish::Args),
     /// Write the distance matrix of a library, as numbers or as a picture.
-    Matrix(matrix::Args),
+    Matrix(library::matrix::Args),
     /// Write the animal of every frame as a picture with a transparent background.
-    Sprites(sprites::Args),
+    Sprites(library::sprites::Args),
     /// Write sample footage: a virtual fish whose exact poses are known.
     Sample(sample::Args),
     /// Check whether this machine has everything that flockreel needs, and explain what is missing.
@@ -181,11 +186,14 @@ fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
         Command::Gc(args) => gc::run(args, json),
         Command::Backup(args) => backup::run(args),
         Command::Analyze(args) => analyze::run(args),
+        Command::Scale(args) => library::scale::run(args),
+        Command::Motion(args) => library::motion::run(args),
+        Command::Summary(args) => library::summary::run(args, json),
         Command::Flock(args) => flock::run(args),
         Command::CheckPlan(args) => check_plan::run(args),
         Command::Fish(args) => fish::run(args),
-        Command::Matrix(args) => matrix::run(args),
-        Command::Sprites(args) => sprites::run(args),
+        Command::Matrix(args) => library::matrix::run(args),
+        Command::Sprites(args) => library::sprites::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Doctor(args) => doctor::run(args, json),
         Command::Attempt(args) => attempt::run(args),
@@ -195,12 +203,13 @@ fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
 /// Reads a library for a command that writes to `output`. Temporary data that is too large for memory goes to
 /// the same disk.
 fn read_library(folder: &Path, output: &Path) -> Result<StoredLibrary, Error> {
-    library_dir::read(folder, scratch_beside(output)).map_err(|error| {
-        Error::Usage(format!(
-            "cannot read the library: {}: {error}",
-            folder.display()
-        ))
-    })
+    library_dir::read(folder, scratch_beside(output)).map_err(unreadable(folder))
+}
+
+/// Returns the error of a library folder that cannot be read.
+fn unreadable(folder: &Path) -> impl FnOnce(library_dir::Error) -> Error {
+    let folder = folder.display().to_string();
+    move |error| Error::Usage(format!("cannot read the library: {folder}: {error}"))
 }
 
 /// Returns temporary storage on the disk of the output, in its nearest existing parent folder.

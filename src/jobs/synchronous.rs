@@ -1,5 +1,5 @@
-//! Computations during a request: a planned flock without its video, and all distances of a library as
-//! numbers. They queue no job and store no result. The computation is cancelled if the client disconnects.
+//! Computations during a request: a planned flock without its video, all distances of a library as numbers, and its
+//! motion in centimetres. They queue no job and store no result. The computation is cancelled if the client disconnects.
 
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
@@ -20,6 +20,7 @@ use flockreel_core::cpu::Level;
 use flockreel_core::flock::{Flock, Params, plan_flock};
 use flockreel_core::formats::library_dir::{self, StoredLibrary};
 use flockreel_core::formats::npy;
+use flockreel_core::library::Poses;
 use flockreel_core::progress::Progress;
 
 /// A planned flock, and the time that each step took.
@@ -87,6 +88,23 @@ pub async fn distance_file(
             .map_err(std::io::IntoInnerError::into_error)?)
     };
     compute(context, owner, library, write).await
+}
+
+/// Computes a text from the poses of a library.
+pub async fn from_poses(
+    context: &Context,
+    owner: &Owner,
+    library: &Library,
+    write: impl FnOnce(&Poses) -> String + Send + 'static,
+) -> Result<String, Error> {
+    let permit = context.synchronous_work.acquire(owner).await?;
+    let files = context.store.fetch(&library.folder, &[library_dir::POSES]);
+    let files = files.await?;
+    run_until_dropped(move |_cancellation| {
+        let _permit = permit;
+        Ok(write(&library_dir::read_poses(files.path())?))
+    })
+    .await
 }
 
 /// Runs a computation on a library for the owner of a request. Waits for the owner's turn; fails with

@@ -40,6 +40,8 @@ pub enum Property<'a> {
     Name(&'a str),
     /// Whether it stays even if nobody uses it.
     Pinned(bool),
+    /// Scale, pixels per centimetre, > 0; only of libraries. `None` if it is unknown.
+    PxPerCm(Option<f64>),
 }
 
 /// Kinds of stored resources.
@@ -109,6 +111,8 @@ pub struct Library {
     pub used_ms: i64,
     /// Time at which the analysis finished, milliseconds since 1970.
     pub created_ms: i64,
+    /// Scale, pixels per centimetre; `None` until somebody sets it.
+    pub px_per_cm: Option<f64>,
 }
 
 impl Resource for Library {
@@ -225,7 +229,7 @@ impl ResourceKind {
             ResourceKind::Footage => "select * from footage r".to_owned(),
             ResourceKind::Library => {
                 "select r.id, r.job_id, footage_id, r.folder, params, summary, f.name, sample, \
-                 r.size_bytes, r.pinned, r.used_ms, r.created_ms \
+                 r.size_bytes, r.pinned, r.used_ms, r.created_ms, r.px_per_cm \
                  from libraries r join footage f on f.id = footage_id"
                     .to_owned()
             }
@@ -254,6 +258,7 @@ impl Store {
             let column = match property {
                 Property::Name(_) => "name",
                 Property::Pinned(_) => "pinned",
+                Property::PxPerCm(_) => "px_per_cm",
             };
             let table = kind.plural();
             let sql = format!(
@@ -263,6 +268,7 @@ impl Store {
             let change = match *property {
                 Property::Name(name) => change.bind(name),
                 Property::Pinned(pinned) => change.bind(pinned),
+                Property::PxPerCm(px_per_cm) => change.bind(px_per_cm),
             };
             let change = change.bind(owners.parameter());
             n_changed += change.execute(&mut transaction).await?;

@@ -181,7 +181,7 @@ pub(super) async fn change_flock(
     Id(id): Id,
     Json(change): Json<ResultChange>,
 ) -> JsonAnswer<FlockView> {
-    access.change_result(id, change).await
+    access.change_result(id, &change.properties()).await
 }
 
 /// Delete a flock and its job.

@@ -10,7 +10,7 @@ use crate::store::owners::Owner;
 #[derive(Clone, Debug)]
 pub(in crate::store) enum Value {
     Integer(Option<i64>),
-    Real(f64),
+    Real(Option<f64>),
     Boolean(bool),
     Text(Option<String>),
     Bytes(Option<Vec<u8>>),
@@ -21,7 +21,7 @@ pub(in crate::store) enum Value {
 pub(super) fn arguments<DB: Database>(values: Vec<Value>) -> Result<DB::Arguments, sqlx::Error>
 where
     Option<i64>: for<'q> Encode<'q, DB> + Type<DB>,
-    f64: for<'q> Encode<'q, DB> + Type<DB>,
+    Option<f64>: for<'q> Encode<'q, DB> + Type<DB>,
     bool: for<'q> Encode<'q, DB> + Type<DB>,
     Option<String>: for<'q> Encode<'q, DB> + Type<DB>,
     Option<Vec<u8>>: for<'q> Encode<'q, DB> + Type<DB>,
@@ -56,7 +56,8 @@ macro_rules! from {
 from! {
     i64 => |value| Value::Integer(Some(value));
     Option<i64> => |value| Value::Integer(value);
-    f64 => |value| Value::Real(value);
+    f64 => |value| Value::Real(Some(value));
+    Option<f64> => |value| Value::Real(value);
     bool => |value| Value::Boolean(value);
     &str => |value| Value::Text(Some(value.to_owned()));
     Option<&str> => |value| Value::Text(value.map(str::to_owned));

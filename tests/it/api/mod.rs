@@ -22,6 +22,7 @@ mod owners;
 mod parameters;
 mod pictures;
 mod quota;
+mod scale;
 mod slow_clients;
 mod synchronous;
 mod uploads;

@@ -10,7 +10,7 @@ use crate::common::app::{code_of, json_of};
 use crate::common::clip::{SWIM, SWIM_FRAMES};
 
 /// Starts a service with a library of the swimming fish. Returns the library's path and id.
-async fn with_library() -> (TestApp, String, String) {
+pub(super) async fn with_library() -> (TestApp, String, String) {
     let app = TestApp::working().await;
     let footage_id = app.upload(&SWIM).await;
     let made = app

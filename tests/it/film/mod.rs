@@ -3,6 +3,7 @@
 
 mod accuracy;
 mod cases;
+mod centimetres;
 mod hints;
 mod labels;
 mod masks;

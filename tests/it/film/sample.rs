@@ -59,7 +59,7 @@ fn filmed_with(noise: f64) -> (SampleFilm, Library, analysis::Params) {
     (film, library, params)
 }
 
-fn library_on_disk(dir: &Path) {
+pub(super) fn library_on_disk(dir: &Path) {
     let (_, library, params) = filmed();
     let footage = FootageSummary {
         sha256: "0".repeat(64),
@@ -68,7 +68,7 @@ fn library_on_disk(dir: &Path) {
     library_dir::write(dir, library, params, &footage).expect("the folder can be written");
 }
 
-fn flockreel(args: &[&str]) -> Output {
+pub(super) fn flockreel(args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_flockreel"))
         .args(args)
         .output()

@@ -26,7 +26,7 @@ pub(super) const FILES: [(i64, &str, &str, &[u8]); 7] = [
 ];
 
 /// Schema and rows.
-pub(super) const ROWS: [(i64, &str); 13] = [
+pub(super) const ROWS: [(i64, &str); 14] = [
     (1, ""), // The rows of the stored files follow from FILES.
     (
         2,
@@ -115,5 +115,9 @@ pub(super) const ROWS: [(i64, &str); 13] = [
     (
         17,
         "update jobs set traceparent = '00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01' where id = @21;",
+    ),
+    (
+        18,
+        "update libraries set px_per_cm = 42.5 where id = @13;",
     ),
 ];

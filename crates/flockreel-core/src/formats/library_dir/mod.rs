@@ -11,17 +11,20 @@
 
 mod archive;
 mod limits;
+mod scale;
 
 use std::fs;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
+pub use self::scale::{read_scale, write_scale};
+
 use self::archive::Archive;
 use super::library_json::{self, FootageSummary};
 use super::{picture, poses_json};
 use crate::analysis::Params;
-use crate::library::{Library, Sprites};
+use crate::library::{Library, Poses, Sprites};
 use crate::raster::RgbaImage;
 use crate::scratch::{Full, Scratch};
 
@@ -82,11 +85,13 @@ pub struct StoredLibrary {
 }
 
 const LIBRARY: &str = "library.json";
-const POSES: &str = "poses.json";
+/// Name of the file of the poses.
+pub const POSES: &str = "poses.json";
 const BACKGROUND: &str = "background.png";
 const OCCLUDERS: &str = "occluders.png";
 const MATTES: &str = "mattes.zip";
 const SPRITES: &str = "sprites.zip";
+const SCALE: &str = "scale.json";
 /// Maximum width and height of the pictures in a library, pixels. Free choice.
 const MAX_SIDE_PX: u32 = 16384;
 /// Maximum size of a picture in a library, pixels. A few bytes can claim more than the memory holds. Free choice: sixteen
@@ -110,8 +115,9 @@ pub fn write(
     write_file(POSES, &poses_json::write(&library.poses, Some(params)))?;
     write_file(BACKGROUND, &picture::write_rgb(&library.background))?;
     write_mattes(dir, &library.sprites)?;
-    // Remove the sprites of an earlier analysis.
+    // Remove the sprites and the scale of an earlier analysis.
     fs::remove_file(dir.join(SPRITES)).ok();
+    write_scale(dir, None)?;
     match &library.occluders {
         Some(image) => {
             let png = picture::write_rgba(image.width, image.height, &image.pixels);
@@ -139,14 +145,24 @@ fn write_mattes(dir: &Path, sprites: &Sprites) -> Result<(), Error> {
     })
 }
 
+/// Reads the poses of a library folder.
+pub fn read_poses(dir: &Path) -> Result<Poses, Error> {
+    let poses = poses_json::read(&read_file(dir, POSES)?);
+    let poses = poses.map_err(|cause| Error::Json { file: POSES, cause })?;
+    limits::check_poses(&poses)?;
+    Ok(poses)
+}
+
 /// Reads a library from a folder and stores its mattes in `scratch`.
 pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Error> {
-    let read_file =
-        |file: &'static str| fs::read(dir.join(file)).map_err(|cause| Error::Io { file, cause });
-    let json = |file| move |cause| Error::Json { file, cause };
-    let summary = library_json::read(&read_file(LIBRARY)?).map_err(json(LIBRARY))?;
-    let poses = poses_json::read(&read_file(POSES)?).map_err(json(POSES))?;
-    limits::check(&summary, &poses)?;
+    let read_file = |file| read_file(dir, file);
+    let summary = library_json::read(&read_file(LIBRARY)?);
+    let summary = summary.map_err(|cause| Error::Json {
+        file: LIBRARY,
+        cause,
+    })?;
+    let poses = read_poses(dir)?;
+    limits::check(&summary, poses.frames.len())?;
     let background = picture::read_rgb(&read_file(BACKGROUND)?, poses.image_size_px);
     let background = background.map_err(|cause| Error::Picture {
         file: BACKGROUND,
@@ -190,6 +206,10 @@ pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Erro
         params: summary.params,
         footage: summary.footage,
     })
+}
+
+fn read_file(dir: &Path, file: &'static str) -> Result<Vec<u8>, Error> {
+    fs::read(dir.join(file)).map_err(|cause| Error::Io { file, cause })
 }
 
 /// Reads the objects in front of the animal.

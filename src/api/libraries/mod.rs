@@ -1,24 +1,26 @@
 //! Libraries: the results of analyses, with their pictures and files.
 
-use axum::body::Body;
-use axum::http::{Response, StatusCode, header};
-use serde::Serialize;
+mod computed; // files that are not stored
+
+use axum::http::StatusCode;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tokio_util::io::ReaderStream;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
 use super::download::names::{saved_as, stem};
-use super::download::{Download, Files, built, find as find_file, matches};
-use super::extract::{Access, Conditions, FileOf, Id, Json};
+use super::download::{Download, Files, find as find_file};
+use super::extract::{Access, Conditions, FileOf, Id, Json, given};
 use super::paging::{Filtered, LibraryQuery, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
-use super::resources::{FileView, ResultChange, ResultView, View};
+use super::resources::{FileView, ResultView, View};
 use super::timestamp::rfc3339;
 use crate::jobs::analysis::Summary;
-use crate::jobs::{self, synchronous};
 use crate::store::jobs::JobState;
-use crate::store::resources::Library;
+use crate::store::resources::{Library, Property};
+use computed::{computed, is_computed, scale_of};
+use flockreel_core::code::Code;
+use flockreel_core::library::{Scale, ScaleError};
 
 const FILES: Files = &[
     ("library.json", "application/json"),
@@ -48,9 +50,6 @@ const FILES: Files = &[
 /// Name of the picture of a library in lists. To see it there is no use of the library.
 const LIST_PICTURE: &str = "poster.jpg";
 
-/// Name of the file that is not stored, but computed for each request.
-const DISTANCE_ARRAY: &str = "distance.npy";
-
 /// Summary of a library, the result of one analysis.
 #[derive(Debug, Serialize, ToSchema)]
 pub(super) struct LibraryView {
@@ -79,9 +78,67 @@ pub(super) struct LibraryView {
     params: Value,
     #[serde(flatten)]
     summary: Summary,
+    /// Scale of `motion.csv` and the other files in centimetres, pixels per centimetre. Null until it is set.
+    px_per_cm: Option<f64>,
+    /// Length of the animal, centimetres: `length_px` by the scale. Null without a scale.
+    length_cm: Option<f64>,
     /// Files that can be downloaded, by name. Only in the response for one library.
     #[serde(skip_serializing_if = "Option::is_none")]
     files: Option<Vec<FileView>>,
+}
+
+/// New properties of a library. Absent ones do not change. At least one must be given.
+#[derive(Clone, Copy, Debug, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[schema(min_properties = 1)]
+pub(super) struct LibraryChange {
+    /// Whether it stays even if nobody uses it.
+    #[serde(default, deserialize_with = "given")]
+    #[schema(value_type = bool, required = false)]
+    pinned: Option<bool>,
+    /// Scale, pixels per centimetre of the floor (seen from above) or of the plane in which the animal moves (seen
+    /// from the side). Null takes the scale away.
+    #[serde(default, deserialize_with = "given")]
+    #[schema(value_type = Option<f64>, required = false, minimum = 0.001, maximum = 1000000)]
+    px_per_cm: Option<Option<f64>>,
+    /// Length of the animal from nose to tail tip, centimetres. It sets the scale, instead of `px_per_cm`.
+    #[serde(default, deserialize_with = "given")]
+    #[schema(value_type = f64, required = false, exclusive_minimum = 0)]
+    length_cm: Option<f64>,
+}
+
+impl LibraryChange {
+    /// Returns the new scale of an animal with this length in the picture; `None` if the scale does not change.
+    fn scale(&self, length_px: Option<f64>) -> Result<Option<Option<Scale>>, ScaleError> {
+        match (self.px_per_cm, self.length_cm) {
+            (_, Some(length_cm)) => Ok(Some(Some(Scale::from_length(length_cm, length_px)?))),
+            (Some(Some(px_per_cm)), None) => Ok(Some(Some(Scale::new(px_per_cm)?))),
+            (Some(None), None) => Ok(Some(None)),
+            (None, None) => Ok(None),
+        }
+    }
+
+    /// Returns the changed properties. Fails if there are none, or if they contradict each other.
+    fn properties(&self, library: Library) -> Result<Vec<Property<'static>>, Problem> {
+        let refused = |sentence: &str| Problem::new(Code::InvalidParams, sentence);
+        if self.px_per_cm.is_some() && self.length_cm.is_some() {
+            return Err(refused(
+                "the change must have px_per_cm or length_cm, not both",
+            ));
+        }
+        let summary: Summary = super::stored(&library.summary)?;
+        let scale = self.scale(summary.length_px);
+        let scale = scale.map_err(|error| refused(&error.to_string()))?;
+        let scale = scale.map(|scale| Property::PxPerCm(scale.map(Scale::px_per_cm)));
+        let pinned = self.pinned.map(Property::Pinned);
+        let properties: Vec<_> = pinned.into_iter().chain(scale).collect();
+        if properties.is_empty() {
+            return Err(refused(
+                "the change must have pinned, px_per_cm or length_cm",
+            ));
+        }
+        Ok(properties)
+    }
 }
 
 /// List all libraries, newest first.
@@ -108,10 +165,13 @@ pub(super) async fn get_library(access: Access, Id(id): Id) -> JsonAnswer<Librar
     access.get_result(id).await
 }
 
-/// Pin a library, or unpin it.
+/// Set the scale of a library, or pin it.
 ///
-/// A pinned library stays even if nobody uses it, and so does everything that it was made from.
-#[utoipa::path(patch, path = "/v1/libraries/{id}", params(("id" = Uuid, Path)), request_body = ResultChange,
+/// The scale is a number of pixels per centimetre, or follows from the length of the animal. It changes
+/// `motion.csv`, `motion.json`, `summary.csv` and `summary.json`. Nothing is measured again, and stored files and flocks
+/// do not change. Wrong numbers fail with `invalid_params`. A pinned library stays even if nobody uses it, and so
+/// does everything that it was made from.
+#[utoipa::path(patch, path = "/v1/libraries/{id}", params(("id" = Uuid, Path)), request_body = LibraryChange,
     responses(
     (status = 200, body = LibraryView),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
@@ -120,9 +180,10 @@ pub(super) async fn get_library(access: Access, Id(id): Id) -> JsonAnswer<Librar
 pub(super) async fn change_library(
     access: Access,
     Id(id): Id,
-    Json(change): Json<ResultChange>,
+    Json(change): Json<LibraryChange>,
 ) -> JsonAnswer<LibraryView> {
-    access.change_result(id, change).await
+    let properties = change.properties(access.find::<Library>(id).await?)?;
+    access.change_result(id, &properties).await
 }
 
 /// Delete a library and everything made from it.
@@ -139,6 +200,8 @@ pub(super) async fn delete_library(access: Access, Id(id): Id) -> Result<StatusC
 /// Download a file of a library.
 ///
 /// - `library.json`, `poses.json`, `poses.csv`: the measured data
+/// - `motion.csv`, `motion.json`: place, speed and size in every frame, in centimetres if the library has a scale
+/// - `summary.csv`, `summary.json`: distance, speeds, rest and turns in the film
 /// - `background.png`: the scene without the animal
 /// - `occluders.png`: objects in front of the animal, only if any are known (`occluders` in library.json)
 /// - `distance.png`, `candidates.png`: the distances between clips, and the pairs of similar clips
@@ -150,9 +213,9 @@ pub(super) async fn delete_library(access: Access, Id(id): Id) -> Result<StatusC
 /// - `sprites.zip`: the sprites, one PNG per frame
 /// - `mattes.zip`: the animal cut out of every frame as filmed, one PNG per frame
 ///
-/// Range and conditional requests are supported. Only `distance.npy` is always sent whole: it is computed for
-/// each request. It fails with `too_many_frames` for longer footage, and with `busy` if another computation
-/// does not end within 20 seconds.
+/// Range and conditional requests are supported. Motion, summary and `distance.npy` are computed for each request
+/// and sent whole. They fail with `busy` if another computation does not end within 20 seconds, and
+/// `distance.npy` with `too_many_frames` for longer footage. The ETag of motion and summary depends on the scale.
 #[utoipa::path(get, path = "/v1/libraries/{id}/{file}",
     params(("id" = Uuid, Path), ("file" = String, Path)), responses(
     (status = 200, description = "the file"),
@@ -165,10 +228,10 @@ pub(super) async fn get_library_file(
     FileOf(id, name): FileOf,
     conditions: Conditions,
 ) -> Answer {
-    if name == DISTANCE_ARRAY {
+    if is_computed(&name) {
         let library = access.find::<Library>(id).await?;
         access.note_use::<Library>(&library);
-        return distance_array(&access, &library, &conditions).await;
+        return computed(&access, &library, &name, &conditions).await;
     }
     let (name, media_type) = find_file(FILES, &name)?;
     let library = access.find::<Library>(id).await?;
@@ -189,37 +252,6 @@ fn saved_name(library: &Library, name: &str) -> String {
     format!("{}_{name}", stem(&library.name))
 }
 
-/// Returns distance.npy. The library's files never change, so clients may cache the result forever.
-async fn distance_array(access: &Access, library: &Library, conditions: &Conditions) -> Answer {
-    let etag = format!("\"{}-{DISTANCE_ARRAY}\"", library.id);
-    let known = conditions.headers.get(header::IF_NONE_MATCH);
-    let answer = Response::builder().header(header::ETAG, &etag).header(
-        header::CACHE_CONTROL,
-        "private, max-age=31536000, immutable",
-    );
-    let known = known.and_then(|tags| tags.to_str().ok());
-    if known.is_some_and(|tags| matches(tags, &etag)) {
-        return built(answer.status(StatusCode::NOT_MODIFIED).body(Body::empty()));
-    }
-    let (context, owner) = (&access.state.context, &access.caller.account.owner);
-    let file = synchronous::distance_file(context, owner, library).await?;
-    let n_bytes = file.metadata().map_err(jobs::Error::Io)?.len();
-    let file = ReaderStream::new(tokio::fs::File::from_std(file));
-    built(
-        answer
-            .header(header::CONTENT_TYPE, "application/octet-stream")
-            .header(header::CONTENT_LENGTH, n_bytes)
-            .header(
-                header::CONTENT_DISPOSITION,
-                saved_as(
-                    "application/octet-stream",
-                    &saved_name(library, DISTANCE_ARRAY),
-                ),
-            )
-            .body(Body::from_stream(file)),
-    )
-}
-
 impl View for LibraryView {
     type Stored = Library;
 
@@ -228,7 +260,11 @@ impl View for LibraryView {
     }
 
     fn from_row(row: Library) -> Result<LibraryView, Problem> {
+        let summary: Summary = super::stored(&row.summary)?;
+        let length_cm = scale_of(&row).zip(summary.length_px);
         Ok(LibraryView {
+            px_per_cm: row.px_per_cm,
+            length_cm: length_cm.map(|(scale, length_px)| scale.cm(length_px)),
             id: row.id,
             job_id: row.job_id,
             state: JobState::Done.name(),
@@ -240,7 +276,7 @@ impl View for LibraryView {
             size_bytes: row.size_bytes,
             created_at: rfc3339(row.created_ms),
             params: super::stored(&row.params)?,
-            summary: super::stored(&row.summary)?,
+            summary,
             files: None,
         })
     }

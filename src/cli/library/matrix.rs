@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::{Error, Listener, Summary};
+use crate::cli::{self, Error, Listener, Summary};
 use flockreel_core::analysis::similarity::distance::{
     Cancelled, ComparedSprites, DistanceMatrix, Distances, Side,
 };
@@ -40,7 +40,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             args.output.display()
         )));
     }
-    let stored = super::read_library(&args.library, &args.output)?;
+    let stored = cli::read_library(&args.library, &args.output)?;
     let library = stored.library;
     let pixels = ComparedSprites::new(&library.sprites, &library.poses, stored.params.planes)
         .map_err(|error| Error::work(error.code(), &error))?;
@@ -64,7 +64,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             } else {
                 map.draw_distances()
             };
-            super::write_file(&args.output, png)?;
+            cli::write_file(&args.output, png)?;
         }
     }
     Ok(Some(Summary(serde_json::json!({

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use serde_json::json;
 
-use super::{Error, Summary};
+use crate::cli::{self, Error, Summary};
 use flockreel_core::formats::{picture, picture_archive};
 
 /// Arguments of `sprites`.
@@ -20,7 +20,7 @@ pub struct Args {
 
 /// Writes the sprites.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
-    let stored = super::read_library(&args.library, &args.output)?;
+    let stored = cli::read_library(&args.library, &args.output)?;
     let sprites = &stored.library.sprites;
     let folder = &args.output;
     std::fs::create_dir_all(folder)
@@ -31,7 +31,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     present.par_iter().try_for_each(|&idx| {
         let path = folder.join(picture_archive::frame_name(idx));
         let bytes = picture::write_rgba(sprites.width(), sprites.height(), &sprites.sprite(idx));
-        super::write_file(&path, bytes)
+        cli::write_file(&path, bytes)
     })?;
     Ok(Some(Summary(json!({
         "sprites": present.len(),

@@ -1,0 +1,139 @@
+//! Files of a library that are not stored, but computed for each request: the distances of its clips, and its
+//! motion in centimetres, which follows from its poses and its scale.
+
+use axum::body::{Body, Bytes};
+use axum::http::response::Builder;
+use axum::http::{Response, StatusCode, header};
+use sha2::{Digest, Sha256};
+use tokio_util::io::ReaderStream;
+
+use super::saved_name;
+use crate::api::download::names::saved_as;
+use crate::api::download::{built, matches};
+use crate::api::extract::{Access, Conditions};
+use crate::api::problem::{Answer, Problem};
+use crate::jobs::{self, synchronous};
+use crate::store::blobs::hex;
+use crate::store::resources::Library;
+use flockreel_core::formats::motion;
+use flockreel_core::library::{Poses, Scale};
+
+/// Name of the file with the distances.
+const DISTANCE_ARRAY: &str = "distance.npy";
+
+/// Writes a file from the poses of a library, its id and its scale.
+type WriteMotion = fn(&str, &Poses, Option<Scale>) -> String;
+
+/// Files that depend on the scale of the library: name, media type and writer.
+const MOTION_FILES: [(&str, &str, WriteMotion); 4] = [
+    (
+        "motion.csv",
+        "text/csv; charset=utf-8",
+        |_, poses, scale| motion::write_motion_csv(poses, scale),
+    ),
+    ("motion.json", "application/json", |_, poses, scale| {
+        motion::write_motion_json(poses, scale)
+    }),
+    (
+        "summary.csv",
+        "text/csv; charset=utf-8",
+        |id, poses, scale| motion::write_summary_csv(&[(id, poses, scale)]),
+    ),
+    ("summary.json", "application/json", |_, poses, scale| {
+        motion::write_summary_json(poses, scale)
+    }),
+];
+
+/// Returns whether a file is computed for each request.
+pub(super) fn is_computed(name: &str) -> bool {
+    name == DISTANCE_ARRAY || MOTION_FILES.iter().any(|(known, ..)| *known == name)
+}
+
+/// Returns the response to a request for a computed file, which is sent whole.
+pub(super) async fn computed(
+    access: &Access,
+    library: &Library,
+    name: &str,
+    conditions: &Conditions,
+) -> Answer {
+    match MOTION_FILES.iter().find(|(known, ..)| *known == name) {
+        Some(file) => motion_file(access, library, *file, conditions).await,
+        None => distance_array(access, library, conditions).await,
+    }
+}
+
+/// Returns the scale of a library. The database accepts no other numbers than a scale may have.
+pub(super) fn scale_of(library: &Library) -> Option<Scale> {
+    library
+        .px_per_cm
+        .and_then(|px_per_cm| Scale::new(px_per_cm).ok())
+}
+
+/// Returns a file that depends on the scale. Its ETag is the SHA-256 of its content, so it changes with the scale, and
+/// clients ask for it again.
+async fn motion_file(
+    access: &Access,
+    library: &Library,
+    (name, media_type, write): (&str, &'static str, WriteMotion),
+    conditions: &Conditions,
+) -> Answer {
+    let (context, owner) = (&access.state.context, &access.caller.account.owner);
+    let (id, scale) = (library.id.to_string(), scale_of(library));
+    let text = synchronous::from_poses(context, owner, library, move |poses| {
+        write(&id, poses, scale)
+    });
+    let text = text.await?;
+    let etag = format!("\"{}\"", hex(&Sha256::digest(&text)));
+    let answer = tagged(&etag, "private, no-cache");
+    if is_known(conditions, &etag) {
+        return not_modified(answer);
+    }
+    let answer = with_type(answer, media_type, &saved_name(library, name));
+    let body = Bytes::from(text);
+    built(
+        answer
+            .header(header::CONTENT_LENGTH, body.len())
+            .body(body.into()),
+    )
+}
+
+/// Returns distance.npy. The library's files never change, so clients may cache the result forever.
+async fn distance_array(access: &Access, library: &Library, conditions: &Conditions) -> Answer {
+    let etag = format!("\"{}-{DISTANCE_ARRAY}\"", library.id);
+    let answer = tagged(&etag, "private, max-age=31536000, immutable");
+    if is_known(conditions, &etag) {
+        return not_modified(answer);
+    }
+    let (context, owner) = (&access.state.context, &access.caller.account.owner);
+    let file = synchronous::distance_file(context, owner, library).await?;
+    let n_bytes = file.metadata().map_err(jobs::Error::Io)?.len();
+    let file = ReaderStream::new(tokio::fs::File::from_std(file));
+    let name = saved_name(library, DISTANCE_ARRAY);
+    let answer = with_type(answer, "application/octet-stream", &name);
+    let answer = answer.header(header::CONTENT_LENGTH, n_bytes);
+    built(answer.body(Body::from_stream(file)))
+}
+
+fn tagged(etag: &str, cache_control: &str) -> Builder {
+    let answer = Response::builder().header(header::ETAG, etag);
+    answer.header(header::CACHE_CONTROL, cache_control)
+}
+
+fn with_type(answer: Builder, media_type: &'static str, saved_name: &str) -> Builder {
+    let answer = answer.header(header::CONTENT_TYPE, media_type);
+    answer.header(
+        header::CONTENT_DISPOSITION,
+        saved_as(media_type, saved_name),
+    )
+}
+
+/// Returns whether the client has the file with this tag.
+fn is_known(conditions: &Conditions, etag: &str) -> bool {
+    let known = conditions.headers.get(header::IF_NONE_MATCH);
+    let known = known.and_then(|tags| tags.to_str().ok());
+    known.is_some_and(|tags| matches(tags, etag))
+}
+
+fn not_modified(answer: Builder) -> Result<Response<Body>, Problem> {
+    built(answer.status(StatusCode::NOT_MODIFIED).body(Body::empty()))
+}
