@@ -1,6 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { changedParams, sizeFromRuler } from "../../static/js/desk/remeasure-params.js";
+import { changedParams } from "../../static/js/desk/remeasure-params.js";
 import { append, derive, emptyColumns, fillTailBeat, firstFrame, frameAt, headOf } from "../../static/js/desk/columns.js";
 import { gapsOf } from "../../static/js/desk/gaps.js";
 import { svgPen, thinned, trace } from "../../static/js/desk/lines.js";
@@ -49,13 +49,13 @@ const pose = (k, more = {}) => ({ frame: k, time_s: k / 10, detected: true, cut:
 const filled = (poses) => {
   const columns = emptyColumns(poses.length, 10);
   for (const one of poses) append(columns, one);
-  derive(columns, 20);
+  derive(columns);
   return columns;
 };
 
-test("speed is measured in body lengths per second", () => {
-  const { speed_bl_per_s } = filled(Array.from({ length: 9 }, (_, k) => pose(k)));
-  assert.equal(speed_bl_per_s[4], 5);
+test("speed is measured in pixels per second", () => {
+  const { speed_px_per_s } = filled(Array.from({ length: 9 }, (_, k) => pose(k)));
+  assert.equal(speed_px_per_s[4], 100);
 });
 
 test("a moment without the animal has no values", () => {
@@ -96,12 +96,6 @@ test("only changed settings are sent, and settings of the former measurement sta
   assert.deepEqual(send({ ...defaults, threshold: 10 }, { view: "top" }), { threshold: 10, view: "top" });
   assert.deepEqual(send({ ...defaults, threshold: 10 }, { threshold: 18 }), {});
   assert.deepEqual(send({ ...defaults, gone: 1 }, { ignore: [{ box_px: [1, 2, 3, 4] }] }, "papers"), { preset: "papers", ignore: [{ box_px: [1, 2, 3, 4] }] });
-});
-
-test("a ruler gives the scale, and the animal its measured proportions", () => {
-  assert.deepEqual(sizeFromRuler({ line_px: 200, line_cm: 10, away_cm: 50, medium_index: 1, length_px: 100, height_px: 40 }), {
-    camera: { z_min_m: 0.5, pane_px_per_m: 2000, medium_index: 1 }, animal: { length_m: 0.05, height_m: 0.02 },
-  });
 });
 
 test("the weakest moments are apart and say why", () => {

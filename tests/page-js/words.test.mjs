@@ -9,7 +9,7 @@ import { grouped } from "../../static/js/studio/groups.js";
 
 const STATIC = new URL("../../static/", import.meta.url);
 /** Japanese words without a Japanese letter: names, numbers, units and marks. */
-const UNTRANSLATED = ["foot.api", "upload.of", "thing.weight.none", "thing.flee_bl.none", "set.format.gif", "set.format.webp", "share.curl", "share.python", "unit.cm", "desk.of_frames", "desk.compass.share"];
+const UNTRANSLATED = ["foot.api", "upload.of", "thing.weight.none", "thing.flee_bl.none", "set.format.gif", "set.format.webp", "share.curl", "share.python", "unit.cm", "unit.m", "desk.of_frames", "desk.compass.share"];
 
 const files = readdirSync(STATIC, { recursive: true, withFileTypes: true })
   .filter((file) => file.isFile() && /\.(js|html)$/.test(file.name) && !file.parentPath.endsWith("words"))

@@ -7,7 +7,7 @@ import subprocess
 import pytest
 from playwright.sync_api import expect
 
-from steps import fetch, until
+from steps import fetch, said, say, until
 
 pytestmark = pytest.mark.thorough
 
@@ -302,3 +302,29 @@ def test_tables_say_what_the_pictures_show(page, library):
     n_jumps = min(20, len(library[2]["transitions"]))
     expect(page.locator("table.jumps tbody tr")).to_have_count(n_jumps)
     expect(page.locator("table.files tbody tr").filter(has_text="poses.csv")).to_have_count(1)
+
+
+def test_ruler_changes_plot_numbers_and_csv_to_centimetres(page, library):
+    address, files, _ = library
+    open_desk(page, address + "?t=2&tab=size")
+    panel, title, distance = page.locator("#panel-size"), page.locator(".plot-speed .plot-title"), page.locator(".motion-numbers dd").first
+    in_body_lengths = say(page, "desk.plot.speed", unit=say(page, "unit.speed.bl"))
+    expect(title).to_have_text(in_body_lengths)
+    expect(distance).to_have_text(said(page, "unit.bl"))
+    panel.locator("[name=line_cm]").fill("10")
+    box = panel.locator("canvas").bounding_box()
+    page.mouse.move(box["x"] + box["width"] * 0.25, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] * 0.75, box["y"] + box["height"] / 2)
+    page.mouse.up()
+    expect(title).to_have_text(say(page, "desk.plot.speed", unit="cm/s"))
+    expect(distance).to_have_text(said(page, "unit.cm"))
+    measured = json.loads(fetch(files))
+    assert measured["px_per_cm"] == pytest.approx(measured["image_size_px"][0] / 20, rel=0.02)
+    header, *rows = [line.split(",") for line in fetch(files + "/motion.csv").decode().splitlines()]
+    shown = float(re.search(r"([\d.]+) cm/s", page.locator(".reading").inner_text())[1])
+    assert shown == pytest.approx(float(rows[2 * FPS][header.index("speed_cm_per_s")]), rel=0.02, abs=0.06)
+    panel.get_by_role("button", name=say(page, "desk.scale.none")).click()
+    expect(title).to_have_text(in_body_lengths)
+    expect(distance).to_have_text(said(page, "unit.bl"))
+    assert json.loads(fetch(files))["px_per_cm"] is None

@@ -5,6 +5,7 @@ declare namespace Api {
   interface Files {
     "/v1/libraries/{id}/library.json": JsonFile<LibraryFile>;
     "/v1/libraries/{id}/poses.json": JsonFile<PosesFile>;
+    "/v1/libraries/{id}/summary.json": JsonFile<SummaryFile>;
     "/v1/flocks/{id}/flock.json": JsonFile<FlockFile>;
     "/openapi.json": JsonFile<{ components: { schemas: Record<string, JsonSchema> } }>;
   }
@@ -26,6 +27,11 @@ declare namespace Api {
     n_foreign_frames?: number;
     kappa_used?: number | null;
   }
+
+  type SummaryFile = Record<
+    "px_per_cm" | "distance_bl" | "distance_cm" | `${"mean" | "median" | "peak"}_speed_${"bl" | "cm"}_per_s` | "rest_s" | "n_rest_bouts" | "turns_per_min",
+    number | null
+  >;
 
   interface Pose {
     frame: number;

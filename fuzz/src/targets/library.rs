@@ -15,12 +15,13 @@ use flockreel_core::flock::advice::Advice;
 use flockreel_core::flock::check::check;
 use flockreel_core::flock::{Compositor, Flock, Params, Shot, plan_flock};
 use flockreel_core::formats::atlas::Atlas;
+use flockreel_core::formats::csv::motion::Film;
 use flockreel_core::formats::distance_map::DistanceMap;
 use flockreel_core::formats::flock_overlay::FlockOverlay;
 use flockreel_core::formats::library_dir::{self, StoredLibrary};
 use flockreel_core::formats::overlay::Overlay;
 use flockreel_core::formats::{csv, flock_json, flock_plan, glb, picture, picture_archive, svg};
-use flockreel_core::library::Library;
+use flockreel_core::library::{Library, Scale};
 use flockreel_core::parameters::Parameters;
 use flockreel_core::progress::Silent;
 use flockreel_core::raster::{ColorSpec, Frame, RgbImage};
@@ -141,6 +142,13 @@ fn read_with(name: &str, bytes: &[u8]) {
 /// Draws what `analyze` draws of a library, and what the page loads.
 fn show(library: &Library) {
     csv::write_poses(&library.poses);
+    let film = Film {
+        poses: &library.poses,
+        length_px: library.stats.length_px,
+        scale: Scale::new(1e-3).ok(),
+    };
+    film.motion_json();
+    film.summary_json();
     svg::pictures(library);
     let atlas = Atlas::new(library);
     atlas.to_json();

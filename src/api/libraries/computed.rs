@@ -12,37 +12,31 @@ use crate::api::download::names::saved_as;
 use crate::api::download::{built, matches};
 use crate::api::extract::{Access, Conditions};
 use crate::api::problem::{Answer, Problem};
+use crate::api::stored;
+use crate::jobs::analysis::Summary;
 use crate::jobs::{self, synchronous};
 use crate::store::blobs::hex;
 use crate::store::resources::Library;
-use flockreel_core::formats::motion;
-use flockreel_core::library::{Poses, Scale};
+use flockreel_core::formats::csv::motion::{self, Film};
+use flockreel_core::library::Scale;
 
 /// Name of the file with the distances.
 const DISTANCE_ARRAY: &str = "distance.npy";
 
-/// Writes a file from the poses of a library, its id and its scale.
-type WriteMotion = fn(&str, &Poses, Option<Scale>) -> String;
+/// Writes a file from a film and the id of its library.
+type WriteMotion = fn(&str, Film<'_>) -> String;
 
 /// Files that depend on the scale of the library: name, media type and writer.
 const MOTION_FILES: [(&str, &str, WriteMotion); 4] = [
-    (
-        "motion.csv",
-        "text/csv; charset=utf-8",
-        |_, poses, scale| motion::write_motion_csv(poses, scale),
-    ),
-    ("motion.json", "application/json", |_, poses, scale| {
-        motion::write_motion_json(poses, scale)
+    ("motion.csv", CSV, |_, film| film.motion_csv()),
+    ("motion.json", JSON, |_, film| film.motion_json()),
+    ("summary.csv", CSV, |id, film| {
+        motion::write_summaries(&[(id, film)])
     }),
-    (
-        "summary.csv",
-        "text/csv; charset=utf-8",
-        |id, poses, scale| motion::write_summary_csv(&[(id, poses, scale)]),
-    ),
-    ("summary.json", "application/json", |_, poses, scale| {
-        motion::write_summary_json(poses, scale)
-    }),
+    ("summary.json", JSON, |_, film| film.summary_json()),
 ];
+const CSV: &str = "text/csv; charset=utf-8";
+const JSON: &str = "application/json";
 
 /// Returns whether a file is computed for each request.
 pub(super) fn is_computed(name: &str) -> bool {
@@ -69,6 +63,11 @@ pub(super) fn scale_of(library: &Library) -> Option<Scale> {
         .and_then(|px_per_cm| Scale::new(px_per_cm).ok())
 }
 
+/// Returns the length of the animal in the picture, pixels.
+pub(super) fn length_px(library: &Library) -> Result<Option<f64>, Problem> {
+    Ok(stored::<Summary>(&library.summary)?.length_px)
+}
+
 /// Returns a file that depends on the scale. Its ETag is the SHA-256 of its content, so it changes with the scale, and
 /// clients ask for it again.
 async fn motion_file(
@@ -79,8 +78,14 @@ async fn motion_file(
 ) -> Answer {
     let (context, owner) = (&access.state.context, &access.caller.account.owner);
     let (id, scale) = (library.id.to_string(), scale_of(library));
+    let length_px = length_px(library)?;
     let text = synchronous::from_poses(context, owner, library, move |poses| {
-        write(&id, poses, scale)
+        let film = Film {
+            poses,
+            length_px,
+            scale,
+        };
+        write(&id, film)
     });
     let text = text.await?;
     let etag = format!("\"{}\"", hex(&Sha256::digest(&text)));

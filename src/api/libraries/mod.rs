@@ -18,7 +18,7 @@ use super::timestamp::rfc3339;
 use crate::jobs::analysis::Summary;
 use crate::store::jobs::JobState;
 use crate::store::resources::{Library, Property};
-use computed::{computed, is_computed, scale_of};
+use computed::{computed, is_computed, length_px, scale_of};
 use flockreel_core::code::Code;
 use flockreel_core::library::{Scale, ScaleError};
 
@@ -119,15 +119,14 @@ impl LibraryChange {
     }
 
     /// Returns the changed properties. Fails if there are none, or if they contradict each other.
-    fn properties(&self, library: Library) -> Result<Vec<Property<'static>>, Problem> {
+    fn properties(&self, library: &Library) -> Result<Vec<Property<'static>>, Problem> {
         let refused = |sentence: &str| Problem::new(Code::InvalidParams, sentence);
         if self.px_per_cm.is_some() && self.length_cm.is_some() {
             return Err(refused(
                 "the change must have px_per_cm or length_cm, not both",
             ));
         }
-        let summary: Summary = super::stored(&library.summary)?;
-        let scale = self.scale(summary.length_px);
+        let scale = self.scale(length_px(library)?);
         let scale = scale.map_err(|error| refused(&error.to_string()))?;
         let scale = scale.map(|scale| Property::PxPerCm(scale.map(Scale::px_per_cm)));
         let pinned = self.pinned.map(Property::Pinned);
@@ -182,7 +181,7 @@ pub(super) async fn change_library(
     Id(id): Id,
     Json(change): Json<LibraryChange>,
 ) -> JsonAnswer<LibraryView> {
-    let properties = change.properties(access.find::<Library>(id).await?)?;
+    let properties = change.properties(&access.find::<Library>(id).await?)?;
     access.change_result(id, &properties).await
 }
 

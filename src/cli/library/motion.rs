@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
+use super::Measured;
 use crate::cli::{self, Error, Summary};
-use flockreel_core::formats::motion;
+use flockreel_core::formats::csv::motion::Film;
+use flockreel_core::library::Scale;
 
 /// Arguments of `motion`.
 #[derive(Debug, clap::Args)]
@@ -21,20 +23,19 @@ pub struct Args {
 /// Writes the motion.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let write = match cli::extension(&args.output).as_str() {
-        "csv" => motion::write_motion_csv,
-        "json" => motion::write_motion_json,
+        "csv" => Film::motion_csv,
+        "json" => Film::motion_json,
         _ => {
             let output = args.output.display();
             let sentence = format!("the output must end in .csv or .json: {output}");
             return Err(Error::Usage(sentence));
         }
     };
-    let poses = super::read_poses(&args.library)?;
-    let scale = super::read_scale(&args.library)?;
-    cli::write_file(&args.output, write(&poses, scale))?;
+    let measured = Measured::read(&args.library)?;
+    cli::write_file(&args.output, write(measured.film()))?;
     Ok(Some(Summary(json!({
         "output": args.output,
-        "frames": poses.frames.len(),
-        "px_per_cm": scale.map(|scale| scale.px_per_cm()),
+        "frames": measured.poses.frames.len(),
+        "px_per_cm": measured.scale.map(Scale::px_per_cm),
     }))))
 }

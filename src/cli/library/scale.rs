@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
+use super::Measured;
 use crate::cli::set::finite;
 use crate::cli::{Error, Summary};
-use flockreel_core::analysis::stats;
 use flockreel_core::formats::library_dir;
 use flockreel_core::library::Scale;
 
@@ -38,8 +38,8 @@ struct Given {
 
 /// Writes or removes the scale.
 pub fn run(args: Args) -> Result<Option<Summary>, Error> {
-    let poses = super::read_poses(&args.library)?;
-    let length_px = stats::length_px(&poses);
+    let measured = Measured::read(&args.library)?;
+    let length_px = measured.film().length_px;
     let scale = match (args.given.px_per_cm, args.given.length_cm) {
         (Some(px_per_cm), _) => Some(Scale::new(px_per_cm)),
         (None, Some(length_cm)) => Some(Scale::from_length(length_cm, length_px)),

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
+use super::Measured;
 use crate::cli::{self, Error, Summary};
-use flockreel_core::formats::motion;
+use flockreel_core::formats::csv::motion;
 
 /// Arguments of `summary`.
 #[derive(Debug, clap::Args)]
@@ -17,27 +18,23 @@ pub struct Args {
 
 /// Prints the summaries: CSV, or one line of JSON.
 pub fn run(args: Args, json: bool) -> Result<Option<Summary>, Error> {
-    let mut films = Vec::new();
-    for folder in &args.libraries {
-        let poses = super::read_poses(folder)?;
-        films.push((
-            folder.display().to_string(),
-            poses,
-            super::read_scale(folder)?,
-        ));
-    }
+    let read = args.libraries.iter().map(|folder| {
+        let measured = Measured::read(folder)?;
+        Ok((folder.display().to_string(), measured))
+    });
+    let films: Vec<(String, Measured)> = read.collect::<Result<_, Error>>()?;
     if json {
-        let films = films.iter().map(|(name, poses, scale)| {
-            let summary = motion::write_summary_json(poses, *scale);
+        let films = films.iter().map(|(name, measured)| {
+            let summary = measured.film().summary_json();
             let summary: Value = serde_json::from_str(&summary).unwrap_or_default();
             json!({"library": name, "summary": summary})
         });
         return Ok(Some(Summary(films.collect())));
     }
     let films: Vec<_> = (films.iter())
-        .map(|(name, poses, scale)| (name.as_str(), poses, *scale))
+        .map(|(name, measured)| (name.as_str(), measured.film()))
         .collect();
-    let text = motion::write_summary_csv(&films);
+    let text = motion::write_summaries(&films);
     cli::print_lines(&text.lines().map(str::to_owned).collect::<Vec<_>>())?;
     Ok(None)
 }

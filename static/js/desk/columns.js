@@ -16,7 +16,7 @@ const SPEED_HALF_S = 0.07;
  * @typedef {{n: number, fps: number, time_s: Float64Array, detected: Uint8Array, cut: Uint8Array,
  *   confidence: Float32Array, head_confidence: Float32Array, heading_rad: Float32Array, bend_rad: Float32Array,
  *   length_px: Float32Array, height_px: Float32Array, centroid_px: Float32Array, box_px: Float32Array,
- *   midline_px: Float32Array, speed_bl_per_s: Float32Array, tail_beat_hz: Float32Array, sure_deg: Float32Array, unsure_deg: Float32Array,
+ *   midline_px: Float32Array, speed_px_per_s: Float32Array, tail_beat_hz: Float32Array, sure_deg: Float32Array, unsure_deg: Float32Array,
  *   hasMidline: boolean, mostSpeed: number, mostBend: number, mostBeat: number}} Columns n: frames; mostSpeed, mostBend, mostBeat: nearly the
  *   greatest values, so that a single wrong frame does not flatten a plot
  */
@@ -24,7 +24,7 @@ const SPEED_HALF_S = 0.07;
 /** Returns empty columns for at most `most` frames. @param {number} most @param {number} fps @returns {Columns} */
 export function emptyColumns(most, fps) {
   const numbers = (/** @type {number} */ each) => new Float32Array(most * each).fill(NaN);
-  const columns = { n: 0, fps, hasMidline: false, mostSpeed: 0, mostBend: 0, mostBeat: 0, time_s: new Float64Array(most), detected: new Uint8Array(most), cut: new Uint8Array(most), centroid_px: numbers(2), box_px: numbers(4), midline_px: new Float32Array(0), speed_bl_per_s: numbers(1), tail_beat_hz: numbers(1), sure_deg: numbers(1), unsure_deg: numbers(1) };
+  const columns = { n: 0, fps, hasMidline: false, mostSpeed: 0, mostBend: 0, mostBeat: 0, time_s: new Float64Array(most), detected: new Uint8Array(most), cut: new Uint8Array(most), centroid_px: numbers(2), box_px: numbers(4), midline_px: new Float32Array(0), speed_px_per_s: numbers(1), tail_beat_hz: numbers(1), sure_deg: numbers(1), unsure_deg: numbers(1) };
   const single = Object.fromEntries(SINGLE.map((name) => [name, numbers(1)]));
   return /** @type {Columns} */ ({ ...columns, ...single });
 }
@@ -48,17 +48,17 @@ export function append(columns, pose) {
 }
 
 /**
- * Computes the speed and the two lines of the heading for frames `from` to `to`.
- * @param {Columns} columns @param {number | null} length_px the body length, pixels
+ * Computes the speed and the two lines of the heading for frames `from` to `to`. The speed is that of motion.csv.
+ * @param {Columns} columns
  */
-export function derive(columns, length_px, from = 0, to = columns.n) {
-  const { n, fps, centroid_px, time_s, heading_rad, head_confidence, speed_bl_per_s, sure_deg, unsure_deg } = columns;
+export function derive(columns, from = 0, to = columns.n) {
+  const { n, fps, centroid_px, time_s, heading_rad, head_confidence, speed_px_per_s, sure_deg, unsure_deg } = columns;
   const half = Math.max(1, Math.round(SPEED_HALF_S * fps));
   const isSure = (/** @type {number} */ k) => !(head_confidence[k] < SURE);
   for (let k = from; k < to; k++) {
     const [a, b] = [Math.max(0, k - half), Math.min(n - 1, k + half)];
     const path_px = Math.hypot(centroid_px[2 * b] - centroid_px[2 * a], centroid_px[2 * b + 1] - centroid_px[2 * a + 1]);
-    speed_bl_per_s[k] = length_px && time_s[b] > time_s[a] ? path_px / length_px / (time_s[b] - time_s[a]) : NaN;
+    speed_px_per_s[k] = time_s[b] > time_s[a] && !Number.isNaN(centroid_px[2 * k]) ? path_px / (time_s[b] - time_s[a]) : NaN;
     const degrees = (heading_rad[k] * 180) / Math.PI;
     sure_deg[k] = isSure(k) ? degrees : NaN;
     // A piece of line between a sure and an unsure moment is unsure.
@@ -79,7 +79,7 @@ export function measureRanges(columns) {
     for (let k = 0; k < columns.n; k += step) if (!Number.isNaN(values[k])) seen.push(Math.abs(values[k]));
     return Float32Array.from(seen).sort()[Math.floor(0.998 * (seen.length - 1))] ?? 0;
   };
-  columns.mostSpeed = most(columns.speed_bl_per_s);
+  columns.mostSpeed = most(columns.speed_px_per_s);
   columns.mostBend = most(columns.bend_rad);
   columns.mostBeat = most(columns.tail_beat_hz);
 }

@@ -3,19 +3,21 @@
 import { element } from "../app/element.js";
 import { sayOr, say, size } from "../app/words.js";
 
+/** Files that follow from the poses and the scale. The service computes them when they are asked for, so it does not list them. */
+const COMPUTED = ["summary.csv", "motion.csv", "motion.json"];
 /** Files of every library, in the order of use. The service may tell more. */
-const FILES = ["poses.csv", "poses.json", "library.json", "overlay.mp4", "film.mp4", "sprites.zip", "mattes.zip", "distance.npy", "distance.png", "background.png", "headings.svg", "trajectory.svg", "confidence.svg", "transitions.svg"];
+const FILES = [...COMPUTED, "poses.csv", "poses.json", "library.json", "overlay.mp4", "film.mp4", "sprites.zip", "mattes.zip", "distance.npy", "distance.png", "background.png", "headings.svg", "trajectory.svg", "confidence.svg", "transitions.svg"];
 
 /** @param {Api.Library} library */
 export function downloadTable(library) {
   /** @type {{name: string, size_bytes?: number}[]} */
-  const told = library.files ?? FILES.map((name) => ({ name }));
+  const told = library.files ? [...COMPUTED.map((name) => ({ name })), ...library.files] : FILES.map((name) => ({ name }));
   const hasSizes = told.some(({ size_bytes }) => size_bytes !== undefined);
   const place = (/** @type {string} */ name) => { const idx = FILES.indexOf(name); return idx < 0 ? FILES.length : idx; };
   const rows = [...told].sort((a, b) => place(a.name) - place(b.name)).map(({ name, size_bytes }) => element("tr", {},
     element("th", { scope: "row" }, element("a", { href: `/v1/libraries/${library.id}/${encodeURIComponent(name)}`, download: "" }, name)),
     element("td", {}, sayOr(`desk.file.${name}`, "")),
-    hasSizes && element("td.size", {}, size(size_bytes ?? 0))));
+    hasSizes && element("td.size", {}, size_bytes === undefined ? "" : size(size_bytes))));
   const heads = ["name", "use", ...(hasSizes ? ["size"] : [])].map((name) => element("th", { scope: "col" }, say(`desk.files.${name}`)));
   return element("div.table-scroll", { tabIndex: 0, role: "region", "aria-label": say("desk.files") }, element("table.files", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)));
 }

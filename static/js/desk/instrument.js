@@ -37,6 +37,8 @@ export function createInstrument(library, t, life) {
   /** What the time axis shows, s. */
   const span = signal([start_s, end_s]);
   const showsMirrored = signal(true);
+  /** Scale, pixels per centimetre; null if nobody has set it. */
+  const scale = signal(library.px_per_cm ?? null);
   /** The jump that plays or was played last, as frames. */
   const jump = signal(/** @type {{from: number, to: number, mirrored: boolean} | null} */ (null));
 
@@ -64,11 +66,11 @@ export function createInstrument(library, t, life) {
     if (data.done || data.failed) worker.terminate();
   };
   worker.onerror = () => failure.set(unreachable());
-  worker.postMessage({ base: `${location.origin}/v1/libraries/${library.id}`, most: n, fps: library.fps, length_px: library.length_px ?? null });
+  worker.postMessage({ base: `${location.origin}/v1/libraries/${library.id}`, most: n, fps: library.fps });
   life.addEventListener("abort", () => worker.terminate());
   goTo(Math.floor(t * library.fps + 1e-6));
 
-  return { library, life, start_s, end_s, moment, columns, facts, head, failure, isLoaded, span, showsMirrored, jump, first, last, count, goTo, timeOf, frameOf, showSpan };
+  return { library, life, start_s, end_s, moment, columns, facts, head, failure, isLoaded, span, scale, showsMirrored, jump, first, last, count, goTo, timeOf, frameOf, showSpan };
 }
 
 /** Returns the frames of a jump: the last one shown before it and the first one after it. @param {Jump} one @param {number} clipFrames */

@@ -18,9 +18,9 @@ page.onmessage = (/** @type {MessageEvent} */ { data }) => {
 /** Returns the memory of the columns, which moves to the page without a copy. @param {import("./columns.js").Columns} columns */
 const buffersOf = (columns) => Object.values(columns).filter((one) => ArrayBuffer.isView(one)).map(({ buffer }) => buffer);
 
-/** @param {{base: string, most: number, fps: number, length_px: number | null}} asked base: address of the library */
-async function load({ base, most, fps, length_px }) {
-  const [columns] = await Promise.all([loadPoses(`${base}/poses.json`, emptyColumns(most, fps), length_px), loadLibrary(`${base}/library.json`)]);
+/** @param {{base: string, most: number, fps: number}} asked base: address of the library */
+async function load({ base, most, fps }) {
+  const [columns] = await Promise.all([loadPoses(`${base}/poses.json`, emptyColumns(most, fps)), loadLibrary(`${base}/library.json`)]);
   return { columns, done: true };
 }
 
@@ -31,8 +31,8 @@ async function fetched(address) {
   return answer;
 }
 
-/** @param {string} address @param {import("./columns.js").Columns} columns @param {number | null} length_px */
-async function loadPoses(address, columns, length_px) {
+/** @param {string} address @param {import("./columns.js").Columns} columns */
+async function loadPoses(address, columns) {
   const reader = /** @type {ReadableStream<BufferSource>} */ ((await fetched(address)).body).pipeThrough(new TextDecoderStream()).getReader();
   let [rest, head, n_derived, next, pause_ms] = ["", "", 0, performance.now() + REPORT_MS, REPORT_MS];
   for (;;) {
@@ -47,7 +47,7 @@ async function loadPoses(address, columns, length_px) {
     }
     if (done) break;
     if (performance.now() < next || columns.n < 2) continue;
-    derive(columns, length_px, n_derived, columns.n);
+    derive(columns, n_derived, columns.n);
     n_derived = Math.max(0, columns.n - Math.ceil(columns.fps));
     measureRanges(columns);
     page.postMessage({ columns });
@@ -61,7 +61,7 @@ async function loadPoses(address, columns, length_px) {
     columns = emptyColumns(frames.length, columns.fps);
     for (const pose of frames) append(columns, pose);
   }
-  derive(columns, length_px);
+  derive(columns);
   fillTailBeat(columns, facts.tail_beat?.spans ?? []);
   measureRanges(columns);
   page.postMessage({ head: facts });

@@ -4,24 +4,20 @@ import { element } from "../app/element.js";
 import { count, percent, say, sayOr, seconds } from "../app/words.js";
 
 /** @typedef {{key: string, value: string, values?: import("../app/words.js").Values}} Row */
-/** @typedef {{library: Api.Library, facts: {stats: Api.LibraryStats} | null, head?: Api.PosesHead | null}} Measured facts and head are null until they are loaded */
+/** @typedef {{library: Api.Library, head?: Api.PosesHead | null, px_per_cm?: number | null}} Measured head is null until it is loaded */
 
 /**
  * Returns the numbers: the key of the words, the value as text, and values for the words.
  * @param {Measured} measured @returns {Row[]}
  */
-function numbersOf({ library, facts, head = null }) {
-  const stats = facts?.stats;
-  const camera = library.params?.camera;
+function numbersOf({ library, head = null, px_per_cm = library.px_per_cm }) {
   const beat = head?.tail_beat?.spans?.[0];
-  const speeds = stats?.speed_bl_per_s;
   /** @type {(Row | false | null | undefined | 0)[]} */
   const rows = [
     { key: "frames", value: count(library.n_frames), values: { time: seconds(library.n_frames / library.fps), fps: library.fps } },
     { key: "seen", value: percent(library.detected_share) },
     { key: "view", value: say(`desk.view.${library.view}`) },
-    library.length_px && { key: "length", value: camera ? say("unit.cm", { n: (100 * library.length_px) / camera.pane_px_per_m }) : say("unit.px", { n: library.length_px }) },
-    speeds && { key: "speed", value: say("unit.bl_per_s", { n: speeds[1] }), values: { least: speeds[0], most: speeds[2] } },
+    library.length_px && { key: "length", value: px_per_cm ? say("unit.cm", { n: library.length_px / px_per_cm }) : say("unit.px", { n: library.length_px }) },
     beat && { key: "tail_beat", value: say("unit.hz", { n: beat.frequency_hz }) },
     { key: "jumps", value: count(library.n_transitions) },
     { key: "endless", value: percent(library.component_share) },

@@ -10,6 +10,7 @@ import { drawMarks } from "./marks.js";
 import { createMatrix } from "./matrix.js";
 import { patchPanel } from "./patches.js";
 import { drawPath, nearestFrame } from "./path.js";
+import { scalePanel } from "./scale.js";
 import { weakest } from "./weakest.js";
 
 const TABS = ["jumps", "patches", "pose", "trust", "size"];
@@ -28,7 +29,7 @@ export function createPanels(desk, { player, pictures, shoot, tab, remeasure }) 
     patches: () => patchPanel(desk, { player, pictures, chosen }),
     pose: () => pathPanel(desk, player),
     trust: () => trustPanel(desk, { player, shoot, remeasure }),
-    size: () => sizePanel(desk, remeasure),
+    size: () => scalePanel(desk, player),
   };
   const panels = TABS.map((name) => element(`div.panel#panel-${name}`, { role: "tabpanel", tabIndex: -1, "aria-labelledby": `tab-${name}`, hidden: true }));
   const tabs = TABS.map((name) => element(`button.tab#tab-${name}`, { type: "button", role: "tab", "aria-controls": `panel-${name}`, onclick: () => chosen.set(name) }, say(`desk.tab.${name}`)));
@@ -103,17 +104,5 @@ function trustPanel(desk, { player, shoot, remeasure }) {
       moments.length > 0 && element("p.actions", {}, ...["head", "animal"].map((tool) => element("button.quiet", { type: "button", onclick: () => remeasure(tool) }, say(`desk.trust.${tool}_at`)))) || ""]);
   };
   desk.isLoaded.watch(fill, desk.life);
-  return node;
-}
-
-/** How large the animal is, and the way to centimetres. @param {import("./instrument.js").Instrument} desk @param {(tool?: string) => void} remeasure */
-function sizePanel(desk, remeasure) {
-  const node = element("div.panel-size");
-  desk.head.watch((head) => {
-    const length_px = desk.library.length_px;
-    const camera = head?.camera;
-    const size = length_px && camera ? say("desk.size.known", { cm: (100 * length_px) / camera.pane_px_per_m, px: length_px }) : length_px ? say("desk.size.px", { px: length_px }) : say("desk.size.none");
-    node.replaceChildren(element("p", {}, size), element("p.soft", {}, say(camera ? "desk.size.again" : "desk.size.help")), element("p", {}, element("button.quiet", { type: "button", onclick: () => remeasure("ruler") }, say("desk.size.ruler"))));
-  }, desk.life);
   return node;
 }

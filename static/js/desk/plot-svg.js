@@ -12,7 +12,7 @@ export function svgPlot(plot) {
   const node = element("div.plot-box", {}, labels, picture);
   return {
     node,
-    draw({ lines, span, range, ticks, width }) {
+    draw({ lines, span, range, sides, ticks, width }) {
       const height = picture.clientHeight || 1;
       picture.setAttribute("viewBox", `0 0 ${width} ${height}`);
       const xOf = (/** @type {number} */ time_s) => ((time_s - span[0]) / (span[1] - span[0])) * width;
@@ -20,7 +20,6 @@ export function svgPlot(plot) {
         const share = (value - range[0]) / (range[1] - range[0]);
         return 1 + (plot.dir > 0 ? 1 - share : share) * (height - 2);
       };
-      const sides = plot.ticks(range);
       grid.setAttribute("d", [...sides.map(([value]) => `M0 ${yOf(value).toFixed(1)}H${width}`), ...ticks.map((time_s) => `M${xOf(time_s).toFixed(1)} 0V${height}`)].join(""));
       lines.forEach((line, idx) => {
         const pen = svgPen();

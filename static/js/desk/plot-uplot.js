@@ -21,7 +21,7 @@ export async function loadUplot() {
 function uplot(UPlot, plot, life) {
   const node = element("div.plot-box.plot-uplot", { "aria-hidden": "true" });
   /** @type {import("./plots.js").Drawing} */
-  let drawing = { lines: [], span: [0, 1], range: [0, 1], ticks: [], width: 1 };
+  let drawing = { lines: [], span: [0, 1], range: [0, 1], sides: [], ticks: [], width: 1 };
   /** @type {Record<string, string>} */
   let colors = {};
   const pathsOf = (/** @type {Chart} */ u, /** @type {number} */ idx) => {
@@ -42,7 +42,7 @@ function uplot(UPlot, plot, life) {
     scales: { x: { time: false, range: () => /** @type {[number, number]} */ (drawing.span) }, y: { range: () => /** @type {[number, number]} */ (drawing.range), dir: plot.dir } },
     axes: [
       { ...axis, size: 0, values: () => [], splits: () => drawing.ticks },
-      { ...axis, size: LEFT, gap: 4, splits: () => plot.ticks(drawing.range).map(([value]) => value), values: () => plot.ticks(drawing.range).map(([, text]) => text) },
+      { ...axis, size: LEFT, gap: 4, splits: () => drawing.sides.map(([value]) => value), values: () => drawing.sides.map(([, text]) => text) },
     ],
     series: [{}, ...plot.series.map(({ look }) => ({ ...looks[look], points: { show: false }, paths: pathsOf }))],
   };

@@ -1,11 +1,10 @@
-// Fields of "Measure again": view, animals, threshold, part of the film, preset, and the numbers of the ruler.
+// Fields of "Measure again": view, animals, threshold, part of the film, preset.
 // @ts-check
 import { element } from "../app/element.js";
 import { say, seconds } from "../app/words.js";
 
 /**
  * @typedef {import("../app/store.js").Signal<Api.AnalysisParams & {ignore: Api.Schemas["IgnoreParam"][]}>} Draft the parameters to be sent
- * @typedef {{line_cm: number, away_cm: number, medium_index: number}} Measures of the ruler
  */
 
 /** Returns a field that chooses one of some values. @param {Draft} draft @param {"view" | "follow" | "sprites"} name @param {(string | null)[]} values */
@@ -46,18 +45,4 @@ export function part(draft, desk) {
     fill.style.insetInline = `${(100 * a) / end_s}% ${100 - (100 * b) / end_s}%`;
   });
   return element("div.field", { role: "group", "aria-label": say("remeasure.part") }, element("span.field-line", {}, say("remeasure.part"), output), element("div.two-handles", {}, fill, from, to));
-}
-
-/**
- * Returns the fields of the ruler. @param {(name: keyof Measures, value: number) => void} onChange
- * @param {Measures} values
- */
-export function rulerFields(onChange, values) {
-  const number = (/** @type {"line_cm" | "away_cm"} */ name) => {
-    const input = element("input", { type: "number", name, min: 0.1, step: "any", inputMode: "decimal", value: values[name] ? String(values[name]) : "", oninput: () => onChange(name, input.valueAsNumber) });
-    return element("label.field", {}, say(`remeasure.${name}`), input, element("small", {}, say(`remeasure.${name}.help`)));
-  };
-  const medium = element("select", { name: "medium_index", onchange: () => onChange("medium_index", Number(medium.value)) }, element("option", { value: "1" }, say("remeasure.medium.air")), element("option", { value: "1.333" }, say("remeasure.medium.water")));
-  medium.value = String(values.medium_index);
-  return element("div.fields", {}, number("line_cm"), number("away_cm"), element("label.field", {}, say("remeasure.medium"), medium));
 }

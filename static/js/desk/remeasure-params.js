@@ -13,16 +13,3 @@ export function changedParams({ draft, former, defaults, preset }) {
   const names = Object.keys(draft).filter((name) => name in defaults && !isSame(draft[name], preset ? former[name] : defaults[name]));
   return { ...(preset ? { preset } : {}), ...Object.fromEntries(names.map((name) => [name, draft[name]])) };
 }
-
-/**
- * Returns camera and animal from a ruler. The animal has the proportions that were measured.
- * @param {{line_px: number, line_cm: number, away_cm: number, medium_index: number, length_px: number, height_px: number}} ruler
- */
-export function sizeFromRuler({ line_px, line_cm, away_cm, medium_index, length_px, height_px }) {
-  const px_per_m = (100 * line_px) / line_cm;
-  const rounded = (/** @type {number} */ value) => Number(value.toPrecision(6));
-  return {
-    camera: { z_min_m: rounded(away_cm / 100), pane_px_per_m: rounded(px_per_m), medium_index },
-    animal: { length_m: rounded(length_px / px_per_m), height_m: rounded(height_px / px_per_m) },
-  };
-}

@@ -1,5 +1,4 @@
-// The picture of "Measure again", on which the person points at the animal or its head, frames regions to ignore,
-// and draws a ruler. With the keyboard, arrows move a cross, and Enter sets a point or the corners of a box.
+// A picture of the film, on which the person points at the animal or its head, frames regions to ignore, or draws a ruler. With the keyboard, arrows move a cross, and Enter sets a point or the corners of a box.
 // @ts-check
 import { say } from "../app/words.js";
 import { drawnCanvas, fitted, loadPicture } from "./canvas.js";
@@ -10,7 +9,8 @@ const LEAST_PX = 4;
 
 /**
  * @param {import("./instrument.js").Instrument} desk
- * @param {{video: HTMLVideoElement, isBroken: boolean, tool: import("../app/store.js").Signal<Tool>, draft: import("./remeasure-fields.js").Draft, ruler: import("../app/store.js").Signal<number[][] | null>, life: AbortSignal}} parts
+ * @param {{video: HTMLVideoElement, isBroken: boolean, tool: import("../app/store.js").Signal<Tool>, draft?: import("./remeasure-fields.js").Draft, ruler?: import("../app/store.js").Signal<number[][] | null>, life: AbortSignal}} parts
+ *   draft: takes points and boxes; ruler: takes the line
  */
 export function createPicture(desk, { video, isBroken, tool, draft, ruler, life }) {
   const size = desk.library.image_size_px;
@@ -32,16 +32,16 @@ export function createPicture(desk, { video, isBroken, tool, draft, ruler, life 
     const source = !isBroken && video.readyState >= 2 ? video : background;
     if (source) context.drawImage(source, 0, 0, size[0], size[1]);
     context.lineWidth = 2 / zoom;
-    const frames = [...draft.value.ignore.map(({ box_px }) => box_px), ...(drawing && tool.value === "ignore" ? [boxOf(drawing)] : [])];
+    const frames = [...(draft?.value.ignore ?? []).map(({ box_px }) => box_px), ...(drawing && tool.value === "ignore" ? [boxOf(drawing)] : [])];
     for (const [x, y, w, h] of frames) {
       context.fillStyle = "rgb(163 22 31 / 0.45)";
       context.fillRect(x, y, w, h);
       context.strokeStyle = "#fff";
       context.strokeRect(x, y, w, h);
     }
-    const line = drawing && tool.value === "ruler" ? drawing : ruler.value;
+    const line = drawing && tool.value === "ruler" ? drawing : ruler?.value;
     if (line) drawRuler(context, line, zoom, colors);
-    for (const { point, color } of [{ point: draft.value.animal_at?.at_px, color: colors.accent }, { point: draft.value.head?.point, color: colors.water }]) if (point) drawTarget(context, point, color, zoom);
+    for (const { point, color } of [{ point: draft?.value.animal_at?.at_px, color: colors.accent }, { point: draft?.value.head?.point, color: colors.water }]) if (point) drawTarget(context, point, color, zoom);
     if (isKeyboard) drawTarget(context, cross, "#fff", zoom);
   }
 
@@ -56,11 +56,11 @@ export function createPicture(desk, { video, isBroken, tool, draft, ruler, life 
     if (!drawing) return;
     const [from, to] = drawing;
     const frame = desk.moment.value;
-    if (tool.value === "animal") draft.set({ ...draft.value, animal_at: { frame, at_px: to } });
-    if (tool.value === "head") draft.set({ ...draft.value, head: { frame, point: to } });
+    if (draft && tool.value === "animal") draft.set({ ...draft.value, animal_at: { frame, at_px: to } });
+    if (draft && tool.value === "head") draft.set({ ...draft.value, head: { frame, point: to } });
     const box_px = boxOf(drawing);
-    if (tool.value === "ignore" && box_px[2] >= LEAST_PX && box_px[3] >= LEAST_PX) draft.set({ ...draft.value, ignore: [...draft.value.ignore, { box_px, from_s: null, to_s: null }] });
-    if (tool.value === "ruler" && Math.hypot(to[0] - from[0], to[1] - from[1]) >= LEAST_PX) ruler.set(drawing);
+    if (draft && tool.value === "ignore" && box_px[2] >= LEAST_PX && box_px[3] >= LEAST_PX) draft.set({ ...draft.value, ignore: [...draft.value.ignore, { box_px, from_s: null, to_s: null }] });
+    if (tool.value === "ruler" && Math.hypot(to[0] - from[0], to[1] - from[1]) >= LEAST_PX) ruler?.set(drawing);
     drawing = null;
     ask();
   };
@@ -80,7 +80,7 @@ export function createPicture(desk, { video, isBroken, tool, draft, ruler, life 
     ask();
   });
   canvas.addEventListener("blur", () => { isKeyboard = false; ask(); });
-  for (const seen of [draft, ruler, tool, desk.moment]) seen.watch(ask, life);
+  for (const seen of [draft, ruler, tool, desk.moment]) seen?.watch(ask, life);
   video.addEventListener("seeked", ask, { signal: life });
   if (isBroken || video.readyState < 2) void loadPicture(`/v1/libraries/${desk.library.id}/background.png`, life).then((found) => { background = found; ask(); });
   return canvas;

@@ -10,13 +10,13 @@ import { mendsOf } from "../parts/mend.js";
 import { problemBox, showProblem } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
 import { analysisDefaults } from "../studio/schema.js";
-import { choice, part, rulerFields, slide } from "./remeasure-fields.js";
-import { changedParams, sizeFromRuler } from "./remeasure-params.js";
+import { choice, part, slide } from "./remeasure-fields.js";
+import { changedParams } from "./remeasure-params.js";
 import { createPicture } from "./remeasure-picture.js";
 import { comparison, settingName } from "./numbers.js";
 
 /** @type {import("./remeasure-picture.js").Tool[]} */
-const TOOLS = ["animal", "head", "ignore", "ruler"];
+const TOOLS = ["animal", "head", "ignore"];
 
 /**
  * Opens the dialog. @param {import("./instrument.js").Instrument} desk
@@ -32,20 +32,11 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   const former = /** @type {Api.AnalysisParams} */ ({ ...defaults, ...library.params });
   const draft = signal({ ...former, ...params, ignore: params.ignore ?? former.ignore ?? [] });
   const tool = signal(TOOLS.find((one) => one === first) ?? "animal");
-  const ruler = signal(/** @type {number[][] | null} */ (null));
-  const picture = createPicture(desk, { video: player.video, isBroken: player.isBroken.value, tool, draft, ruler, life });
+  const picture = createPicture(desk, { video: player.video, isBroken: player.isBroken.value, tool, draft, life });
 
   const radios = TOOLS.map((name) => element("label.choice", {}, element("input", { type: "radio", name: "remeasure-tool", value: name, checked: name === tool.value, onchange: () => tool.set(name) }), element("span", {}, say(`remeasure.tool.${name}`))));
   const help = element("p.soft");
-  const measures = { line_cm: 0, away_cm: former.camera ? 100 * former.camera.z_min_m : 0, medium_index: former.camera?.medium_index ?? (library.view === "side" ? 1.333 : 1) };
-  const size = element("div", {}, rulerFields((name, value) => { measures[name] = value; applyRuler(); }, measures));
-  tool.watch((now) => { help.textContent = say(`remeasure.tool.${now}.help`); size.hidden = now !== "ruler"; }, life);
-  const applyRuler = () => {
-    if (!ruler.value || !(measures.line_cm > 0) || !(measures.away_cm > 0)) return;
-    const [a, b] = ruler.value;
-    draft.set({ ...draft.value, ...sizeFromRuler({ ...measures, line_px: Math.hypot(b[0] - a[0], b[1] - a[1]), length_px: library.length_px ?? 100, height_px: heightOf(desk.columns.value) ?? 0.4 * (library.length_px ?? 100) }) });
-  };
-  ruler.watch(applyRuler, life);
+  tool.watch((now) => { help.textContent = say(`remeasure.tool.${now}.help`); }, life);
   const frame = element("input", { type: "range", min: desk.first, max: desk.last(), step: 1, "aria-label": say("desk.frame"), oninput: () => desk.goTo(frame.valueAsNumber) });
   desk.moment.watch((now) => { frame.value = String(now); }, life);
 
@@ -66,7 +57,7 @@ export async function openRemeasure(desk, { player, results, tool: first = "anim
   const form = element("form", { method: "dialog" },
     element("header.place-head", {}, element("h2", {}, say("remeasure.title")), element("button.quiet", { type: "button", onclick: () => dialog.close() }, say("cancel"))),
     element("div.remeasure-columns", {},
-      element("div.remeasure-left", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("remeasure.tools")), ...radios), help, element("div.remeasure-box", {}, picture), frame, size, marks),
+      element("div.remeasure-left", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("remeasure.tools")), ...radios), help, element("div.remeasure-box", {}, picture), frame, marks),
       element("div.remeasure-right", {}, choice(draft, "view", [null, "side", "top"]), choice(draft, "follow", ["one", "largest"]), slide(draft, "threshold", { min: 1, max: 100, step: 1 }), part(draft, desk), slide(draft, "kappa", { min: 1, max: 6, step: 0.5 }), choice(draft, "sprites", ["auto", "always"]),
         element("label.field", {}, say("remeasure.preset"), presets, element("small", {}, say("remeasure.preset.help"))))),
     element("footer.remeasure-foot", {}, sent, problem, start));
@@ -101,9 +92,9 @@ async function follow(desk, { begun: { job_id: jobId, library_id: libraryId }, p
   results.scrollIntoView({ block: "center" });
   try {
     await ended(jobId, desk.life, card.update);
-    const [library, facts] = await Promise.all([get(`/v1/libraries/${libraryId}`, desk.life), get(`/v1/libraries/${libraryId}/library.json`, desk.life)]);
+    const library = await get(`/v1/libraries/${libraryId}`, desk.life);
     const link = element("a.button", { href: `/libraries/${libraryId}?compare=${desk.library.id}` }, say("remeasure.open"));
-    results.replaceChildren(element("h2", {}, say("desk.compare.title")), comparison({ library: desk.library, facts: desk.facts.value }, { library, facts }), element("p.actions", {}, link));
+    results.replaceChildren(element("h2", {}, say("desk.compare.title")), comparison({ library: desk.library }, { library }), element("p.actions", {}, link));
   } catch (reason) {
     if (desk.life.aborted) return;
     if (/** @type {any} */ (reason).name === "AbortError") results.replaceChildren();
@@ -126,10 +117,4 @@ function marksOf(draft) {
     ...ignore.map((one, k) => row(say("remeasure.mark.ignore", { size: `${one.box_px[2]} × ${one.box_px[3]}` }), { ignore: ignore.filter((_, idx) => idx !== k) })),
     ...(camera && animal ? [row(say("remeasure.mark.size", { cm: count(100 * animal.length_m) }), { camera: null, animal: null })] : []),
   ];
-}
-
-/** Returns the median height of the animal, pixels; null without one. @param {import("./columns.js").Columns} columns */
-function heightOf({ height_px, n }) {
-  const heights = height_px.slice(0, n).filter((one) => !Number.isNaN(one)).sort();
-  return heights.length ? heights[heights.length >> 1] : null;
 }

@@ -2,6 +2,7 @@
 // @ts-check
 import { element, svg } from "../app/element.js";
 import { degrees, heading, percent, say } from "../app/words.js";
+import { speedUnit, unitOf } from "./scale.js";
 
 /** Speeds of playing. */
 const RATES = [1, 0.5, 0.25, 0.1];
@@ -40,7 +41,7 @@ export function createTransport(desk, { player, nextJump }) {
     of.textContent = say("desk.of_frames", { n: desk.last() });
     reading.textContent = readingOf(desk, moment.value);
   };
-  for (const seen of [moment, desk.columns, desk.isLoaded]) seen.watch(tell, life);
+  for (const seen of [moment, desk.columns, desk.isLoaded, desk.scale]) seen.watch(tell, life);
   const node = element("div.transport", {},
     element("div.buttons", {}, button("start", "desk.first", () => player.move(-Infinity)), button("back", "desk.back", () => player.move(-1)), play, button("on", "desk.on", () => player.move(1)), button("end", "desk.last", () => player.move(Infinity)), jump),
     element("label.go-to", {}, element("span", {}, say("desk.frame.short")), field, of), rate);
@@ -54,7 +55,8 @@ export function readingOf(desk, k) {
   if (k >= columns.n) return [...parts, say("desk.reading.wait")].join(" · ");
   if (!columns.detected[k]) return [...parts, say("desk.not_seen")].join(" · ");
   parts.push(Number.isNaN(columns.heading_rad[k]) ? say("desk.no_heading") : say("desk.heading_is", { heading: heading(columns.heading_rad[k]) }));
-  if (!Number.isNaN(columns.speed_bl_per_s[k])) parts.push(say("desk.speed_is", { n: columns.speed_bl_per_s[k] }));
+  const unit = unitOf(desk);
+  if (!Number.isNaN(columns.speed_px_per_s[k])) parts.push(say("desk.speed_is", { n: columns.speed_px_per_s[k] * unit.each, unit: speedUnit(unit) }));
   if (!Number.isNaN(columns.bend_rad[k])) parts.push(say("desk.bend_is", { n: String(Math.round(degrees(columns.bend_rad[k]))).replace("-", "−") }));
   if (!Number.isNaN(columns.head_confidence[k])) parts.push(say("desk.head_sure", { share: percent(columns.head_confidence[k]) }));
   if (!Number.isNaN(columns.confidence[k])) parts.push(say("desk.place_sure", { share: percent(columns.confidence[k]) }));

@@ -19,6 +19,7 @@ import { createPlayer } from "../desk/player.js";
 import { createPlots } from "../desk/plots.js";
 import { createShots } from "../desk/shots.js";
 import { createStage } from "../desk/stage.js";
+import { summaryCard } from "../desk/summary.js";
 import { createTimeAxis } from "../desk/time-axis.js";
 import { createTransport } from "../desk/transport.js";
 import { showProblem } from "../parts/problem.js";
@@ -56,13 +57,14 @@ export async function show(root, { id, query, life }) {
       element("section.desk-time", {}, element("header.place-head", {}, element("h2", {}, say("desk.over_time")), axis.buttons), axis.node, element("p.soft.keys", {}, say("desk.keys")), dataTable(desk)),
       panels.node),
     results,
+    element("section", {}, element("h2", {}, say("desk.motion")), summaryCard(desk)),
     element("section", {}, element("h2", {}, say("desk.numbers")), numbers),
     element("section", {}, element("h2", {}, say("desk.advice")), element("p.soft", {}, say("desk.advice.help")), adviceCards(desk, { pictures, shoot, acts: { remeasure, showTab } })),
     element("section", {}, element("h2", {}, say("desk.files")), downloadTable(library)));
 
-  const tellNumbers = () => numbers.replaceChildren(numberList({ library, facts: desk.facts.value, head: desk.head.value }));
-  desk.facts.watch(tellNumbers, life);
+  const tellNumbers = () => numbers.replaceChildren(numberList({ library, head: desk.head.value, px_per_cm: desk.scale.value }));
   desk.head.watch(tellNumbers, life);
+  desk.scale.watch(tellNumbers, life);
   desk.failure.watch((problem) => { if (problem) showProblem(failure, problem); }, life);
   desk.moment.watch((frame) => { root.dataset.frame = String(frame); }, life);
   desk.isLoaded.watch((loaded) => { root.dataset.loaded = String(loaded); }, life);
@@ -95,9 +97,6 @@ function followAddress(desk, tab, life) {
 /** Shows the numbers of another measurement beside these. @param {string | null} other @param {{desk: import("../desk/instrument.js").Instrument, results: HTMLElement}} parts */
 async function compareWith(other, { desk, results }) {
   if (!other) return;
-  const base = /** @type {const} */ (`/v1/libraries/${encodeURIComponent(other)}`);
-  const [library, facts] = await Promise.all([get(base, desk.life), get(`${base}/library.json`, desk.life)]);
-  desk.facts.watch((now) => {
-    if (now) results.replaceChildren(element("h2", {}, say("desk.compare.title")), comparison({ library, facts }, { library: desk.library, facts: now }), element("p.actions", {}, element("a.button.quiet", { href: `/libraries/${other}` }, say("desk.compare.back"))));
-  }, desk.life);
+  const library = await get(`/v1/libraries/${encodeURIComponent(other)}`, desk.life);
+  results.replaceChildren(element("h2", {}, say("desk.compare.title")), comparison({ library }, { library: desk.library }), element("p.actions", {}, element("a.button.quiet", { href: `/libraries/${other}` }, say("desk.compare.back"))));
 }

@@ -122,13 +122,14 @@ async fn every_example_of_the_document_works_with_the_sample() {
         code_of(refused.send().await.unwrap(), 422).await,
         "invalid_params"
     );
-    let [footage, flock] = with_sample(&app).await;
+    let [footage, library, flock] = with_sample(&app).await;
     let examples = examples(&app.json("/openapi.json").await);
-    assert_eq!(examples.len(), 7);
+    assert_eq!(examples.len(), 8);
     for (method, path, example) in examples {
-        let id = match path.starts_with("/v1/footage") {
-            true => &footage,
-            false => &flock,
+        let id = match path.split('/').nth(2) {
+            Some("footage") => &footage,
+            Some("libraries") => &library,
+            _ => &flock,
         };
         let request = app
             .request(method, &path.replace("{id}", id))
@@ -152,8 +153,8 @@ async fn every_example_of_the_document_works_with_the_sample() {
     app.assert_sound().await;
 }
 
-/// Stores and measures a sample and makes a flock. Returns the ids of footage and flock.
-async fn with_sample(app: &TestApp) -> [String; 2] {
+/// Stores and measures a sample and makes a flock. Returns the ids of footage, library and flock.
+async fn with_sample(app: &TestApp) -> [String; 3] {
     app.upload(&TINY).await;
     let footage = store_film(app, &SWIM, true).await;
     let body = json!({"footage_id": "sample"});
@@ -164,7 +165,8 @@ async fn with_sample(app: &TestApp) -> [String; 2] {
     let flock = app.accept("/v1/flocks", body).await;
     assert_eq!(flock["library_id"], analysis["library_id"]);
     app.ended_job(&flock["job_id"]).await;
-    [footage, flock["flock_id"].as_str().unwrap().to_owned()]
+    let id = |name: &str| flock[name].as_str().unwrap().to_owned();
+    [footage, id("library_id"), id("flock_id")]
 }
 
 #[tokio::test]

@@ -31,16 +31,17 @@ fn speeds_from_the_side_follow_from_the_length_of_the_animal() {
     let (film, library, _) = filmed();
     let truth = film.truth();
     let length_px = stats::length_px(&library.poses);
-    let length_m = film.animal().length_m;
-    let scale = Scale::from_length(100.0 * length_m, length_px).unwrap();
-    let depth_m = length_m * film.motion().camera.focal_px() / length_px.unwrap();
-    // The plane of the scale is where the fish appears as long as it was measured.
+    let length_cm = 100.0 * film.animal().length_m;
+    let scale = Scale::from_length(length_cm, length_px).unwrap();
+    // The truth has the middle of the drawn silhouette, which sways with the tail, like the measured one.
+    let focal_px = film.motion().camera.focal_px();
     let speed = |k: usize| {
-        let at = |k: usize| truth.frames.get(k)?.position_m;
-        let (before, here, after) = (at(k.checked_sub(1)?)?, at(k)?, at(k + 1)?);
-        let [x, y] = [0, 1].map(|axis| 100.0 * (after[axis] - before[axis]));
-        let cm_per_s = x.hypot(y) * truth.fps / 2.0;
-        let is_in_plane = (here[2] / depth_m - 1.0).abs() < 0.03;
+        let at = |k: usize| truth.frames.get(k)?.centroid_px;
+        let ([x0, y0], [x1, y1]) = (at(k.checked_sub(2)?)?, at(k + 2)?);
+        let px_per_cm = focal_px / (100.0 * truth.frames[k].position_m?[2]);
+        let cm_per_s = (x1 - x0).hypot(y1 - y0) * truth.fps / 4.0 / px_per_cm;
+        // The scale holds in the plane in which the fish appears as long as it was measured.
+        let is_in_plane = (px_per_cm / scale.px_per_cm() - 1.0).abs() < 0.05;
         (is_in_plane && cm_per_s > 1.0).then_some(cm_per_s)
     };
     let error = median_error(&library.poses, scale, speed);

@@ -12,7 +12,6 @@ pub mod glb;
 pub mod ground_truth;
 pub mod library_dir;
 pub mod library_json;
-pub mod motion;
 mod mover;
 pub mod npy;
 pub mod overlay;

@@ -1,5 +1,5 @@
 //! Motion of the animal in the picture: the speed at each frame, and a summary of the whole film: distance,
-//! speeds, rest and turns (docs/reference/formats.md, "Motion"). Lengths are pixels here; `formats::motion`
+//! speeds, rest and turns (docs/reference/formats.md, "Motion"). Lengths are pixels here; `formats::csv::motion`
 //! converts them to body lengths and centimetres.
 
 use std::f64::consts::FRAC_PI_2;

@@ -10,6 +10,9 @@ const PX_PER_CM: RangeInclusive<f64> = 1e-3..=1e6;
 /// Least unit in which lengths are written, pixels. Positions in the picture are rounded to it too.
 const UNIT_PX: f64 = 1e-3;
 
+/// Decimals of a scale that follows from a length: a millionth of the least scale.
+const DECIMALS: i32 = 9;
+
 /// A number of pixels per centimetre that lies within the limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale(f64);
@@ -51,7 +54,7 @@ impl Scale {
             length_cm,
             length_px,
         };
-        Scale::new(length_px / length_cm).map_err(wrong)
+        Scale::new(rounded(length_px / length_cm, DECIMALS)).map_err(wrong)
     }
 
     /// Returns the number of pixels per centimetre.

@@ -1,6 +1,8 @@
 //! poses.csv: one row per frame with the scalars of poses.json, empty if null (docs/reference/formats.md,
 //! "CSV files"). Cells are numbers, `true` or `false`, so nothing needs quotes and no crate for CSV.
 
+pub mod motion; // motion.csv, summary.csv, and the same as JSON
+
 use serde_json::Value;
 
 use super::poses_json;

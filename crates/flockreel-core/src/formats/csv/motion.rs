@@ -2,7 +2,6 @@
 //! summary of a film (docs/reference/formats.md, "Motion"). They follow from poses.json and the scale of the
 //! library. Without a scale, values in centimetres are null, or empty cells.
 
-use crate::analysis::stats;
 use crate::geometry::rounded;
 use crate::library::motion::{speeds_px_per_s, summarize_motion};
 use crate::library::{Pose, Poses, Scale};
@@ -11,49 +10,25 @@ use crate::library::{Pose, Poses, Scale};
 const MOTION_SCHEMA: &str = "flockreel/motion@1";
 const SUMMARY_SCHEMA: &str = "flockreel/summary@1";
 
-/// A film with its body length and its scale: the lengths of all files.
+/// A measured film with its sizes.
 #[derive(Clone, Copy)]
-struct Film<'a> {
-    poses: &'a Poses,
-    /// Body length, pixels.
-    length_px: Option<f64>,
-    scale: Option<Scale>,
+pub struct Film<'a> {
+    /// Poses of all frames.
+    pub poses: &'a Poses,
+    /// Body length, pixels; `None` if it is unknown.
+    pub length_px: Option<f64>,
+    /// Scale; `None` if nobody has set it.
+    pub scale: Option<Scale>,
 }
 
 /// The columns of a table, in order, with the values of one row.
 type Row = Vec<(&'static str, Option<f64>)>;
 
-/// Returns motion.csv: a header, and one row per frame.
-pub fn write_motion_csv(poses: &Poses, scale: Option<Scale>) -> String {
-    let rows = Film::new(poses, scale).frames();
-    let header = rows.first().map(header).unwrap_or_default();
-    let lines = rows.iter().map(cells);
-    let lines: Vec<String> = std::iter::once(header).chain(lines).collect();
-    lines.join("\n") + "\n"
-}
-
-/// Returns motion.json, one line per frame.
-pub fn write_motion_json(poses: &Poses, scale: Option<Scale>) -> String {
-    let film = Film::new(poses, scale);
-    let rows: Vec<String> = film.frames().iter().map(object).collect();
-    let fields = [vec![("fps", Some(poses.fps))], film.size()].concat();
-    let head = json_with_header(MOTION_SCHEMA, &fields);
-    let head = head.trim_end_matches('}');
-    format!("{head},\"frames\":[\n{}\n]}}\n", rows.join(",\n"))
-}
-
-/// Returns summary.json.
-pub fn write_summary_json(poses: &Poses, scale: Option<Scale>) -> String {
-    json_with_header(SUMMARY_SCHEMA, &Film::new(poses, scale).summary()) + "\n"
-}
-
 /// Returns summary.csv: a header, and one row for each film with its name.
-pub fn write_summary_csv<'a>(films: &[(&str, &'a Poses, Option<Scale>)]) -> String {
-    let rows = films
-        .iter()
-        .map(|(name, poses, scale)| (name, Film::new(poses, *scale).summary()));
+pub fn write_summaries(films: &[(&str, Film<'_>)]) -> String {
     let mut text = String::new();
-    for (name, row) in rows {
+    for (name, film) in films {
+        let row = film.summary();
         if text.is_empty() {
             text = format!("library,{}\n", header(&row));
         }
@@ -63,13 +38,26 @@ pub fn write_summary_csv<'a>(films: &[(&str, &'a Poses, Option<Scale>)]) -> Stri
 }
 
 impl Film<'_> {
-    fn new(poses: &Poses, scale: Option<Scale>) -> Film<'_> {
-        let length_px = stats::length_px(poses);
-        Film {
-            poses,
-            length_px,
-            scale,
-        }
+    /// Returns motion.csv: a header, and one row per frame.
+    pub fn motion_csv(self) -> String {
+        let rows = self.frames();
+        let header = rows.first().map(header).unwrap_or_default();
+        let lines = std::iter::once(header).chain(rows.iter().map(cells));
+        lines.collect::<Vec<_>>().join("\n") + "\n"
+    }
+
+    /// Returns motion.json, one line per frame.
+    pub fn motion_json(self) -> String {
+        let rows: Vec<String> = self.frames().iter().map(object).collect();
+        let fields = [vec![("fps", Some(self.poses.fps))], self.size()].concat();
+        let head = json_with_header(MOTION_SCHEMA, &fields);
+        let head = head.trim_end_matches('}');
+        format!("{head},\"frames\":[\n{}\n]}}\n", rows.join(",\n"))
+    }
+
+    /// Returns summary.json.
+    pub fn summary_json(self) -> String {
+        json_with_header(SUMMARY_SCHEMA, &self.summary()) + "\n"
     }
 
     fn cm(self, px: Option<f64>) -> Option<f64> {
@@ -216,13 +204,21 @@ mod tests {
         }
     }
 
+    fn film(poses: &Poses, scale: Option<Scale>) -> Film<'_> {
+        Film {
+            poses,
+            length_px: Some(20.0),
+            scale,
+        }
+    }
+
     fn scale() -> Option<Scale> {
         Scale::new(8.0).ok()
     }
 
     #[test]
     fn rows_of_motion_are_in_centimetres_with_a_scale() {
-        let text = write_motion_csv(&poses(), scale());
+        let text = film(&poses(), scale()).motion_csv();
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(
             lines[0],
@@ -235,9 +231,9 @@ mod tests {
 
     #[test]
     fn without_a_scale_only_body_lengths_are_known() {
-        let text = write_motion_csv(&poses(), None);
+        let text = film(&poses(), None).motion_csv();
         assert_eq!(text.lines().nth(3), Some("2,0.2,,,2,,,,"));
-        let summary = write_summary_csv(&[("film", &poses(), None)]);
+        let summary = write_summaries(&[("film", film(&poses(), None))]);
         let row = summary.lines().nth(1);
         assert_eq!(row, Some("film,,20,,1.1,2,,1.8182,,2,,2,,0,0,"));
     }
@@ -245,7 +241,7 @@ mod tests {
     #[test]
     fn json_has_the_values_of_the_rows() {
         let file: Value =
-            serde_json::from_str(&write_motion_json(&poses(), scale())).expect("JSON");
+            serde_json::from_str(&film(&poses(), scale()).motion_json()).expect("JSON");
         assert_eq!(
             (&file["px_per_cm"], &file["length_px"]),
             (&json!(8), &json!(20))
@@ -253,7 +249,7 @@ mod tests {
         assert_eq!(file["frames"][2]["speed_cm_per_s"], json!(5));
         assert_eq!(file["frames"][11]["x_cm"], Value::Null);
         let summary: Value =
-            serde_json::from_str(&write_summary_json(&poses(), scale())).expect("JSON");
+            serde_json::from_str(&film(&poses(), scale()).summary_json()).expect("JSON");
         assert_eq!(summary["schema"], json!(SUMMARY_SCHEMA));
         assert_eq!(summary["distance_cm"], json!(5));
         assert_eq!(summary["mean_speed_cm_per_s"], json!(4.5455));
@@ -262,7 +258,7 @@ mod tests {
     #[test]
     fn each_film_is_a_row_of_the_summary() {
         let (one, two) = (poses(), poses());
-        let text = write_summary_csv(&[("a, \"b\"", &one, scale()), ("c", &two, None)]);
+        let text = write_summaries(&[("a, \"b\"", film(&one, scale())), ("c", film(&two, None))]);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 3);
         assert!(lines[0].starts_with("library,px_per_cm,length_px,length_cm,seen_s,distance_bl,"));
