@@ -27,7 +27,7 @@ export function scalePanel(desk, player) {
   const { library, life, scale } = desk;
   const length_px = library.length_px;
   const ruler = signal(/** @type {number[][] | null} */ (null));
-  const picture = createPicture(desk, { video: player.video, isBroken: player.isBroken.value, tool: signal("ruler"), ruler, life });
+  const picture = createPicture(desk, { video: player.video, isBroken: player.isBroken.value, tool: signal(/** @type {import("./remeasure-picture.js").Tool} */ ("ruler")), ruler, life });
   const problem = element("div");
   const set = async (/** @type {Api.Body<"patch", "/v1/libraries/{id}">} */ change) => {
     try {
