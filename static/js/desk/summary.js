@@ -4,7 +4,6 @@ import { get } from "../app/api.js";
 import { element } from "../app/element.js";
 import { count, say, seconds } from "../app/words.js";
 import { showProblem } from "../parts/problem.js";
-import { unitOf } from "./scale.js";
 
 /** @param {import("./instrument.js").Instrument} desk */
 export function summaryCard(desk) {
@@ -14,7 +13,7 @@ export function summaryCard(desk) {
       const summary = await get(`/v1/libraries/${desk.library.id}/summary.json`, desk.life);
       const unit = summary.px_per_cm ? "cm" : "bl";
       // Another scale was set in the meantime.
-      if (unitOf(desk).name === "cm" && summary.px_per_cm !== desk.scale.value) return;
+      if (summary.px_per_cm !== desk.scale.value) return;
       node.replaceChildren(element("dl.numbers.motion-numbers", {}, ...rowsOf(summary, unit).map(([key, value]) => element("div", {}, element("dt", {}, say(`desk.motion.${key}`), element("small", {}, say(`desk.motion.${key}.means`))), element("dd", {}, value)))));
     } catch (problem) {
       if (!desk.life.aborted) showProblem(node, problem);
@@ -29,7 +28,7 @@ function rowsOf(summary, unit) {
   const distance = (/** @type {number} */ n) => (unit === "cm" && n >= 100 ? say("unit.m", { n: n / 100 }) : say(`unit.${unit}`, { n }));
   const rows = /** @type {[string, number | null, (n: number) => string][]} */ ([
     ["distance", summary[`distance_${unit}`], distance], speed("mean"), speed("median"), speed("peak"),
-    ["rest", summary.rest_s, (/** @type {number} */ n) => `${seconds(n)} · ${say("desk.motion.bouts", { n: summary.n_rest_bouts ?? 0 })}`],
+    ["rest", summary.rest_s, (/** @type {number} */ n) => (summary.n_rest_bouts ? `${seconds(n)} · ${say("desk.motion.bouts", { n: summary.n_rest_bouts })}` : seconds(n))],
     ["turns", summary.turns_per_min, count],
   ]);
   return rows.flatMap(([key, value, words]) => (value === null ? [] : [[key, words(value)]]));
