@@ -90,7 +90,9 @@ impl Queue {
     /// Claims and ends the next job.
     async fn run_next(&self, now_ms: i64) -> JobId {
         let lease = self.claim(now_ms).await.unwrap();
-        let end = self.store.fail(&lease, Code::NotAVideo, "it is no film", None, now_ms);
+        let end = self
+            .store
+            .fail(&lease, Code::NotAVideo, "it is no film", None, now_ms);
         assert_eq!(end.await.unwrap(), Change::Made);
         lease.job_id
     }

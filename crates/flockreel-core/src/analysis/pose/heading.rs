@@ -12,6 +12,9 @@ use super::Axes;
 const UNIT_SPEED_BL_S: f64 = 0.45;
 /// Greatest evidence from motion, half the log-odds. Free choice.
 const MAX_MOTION_EVIDENCE: f64 = 3.0;
+/// Time after which motion and look of the ends count as new evidence, seconds. Free choice: successive frames show
+/// the same stroke and the same posture.
+const INDEPENDENT_S: f64 = 0.5;
 /// Evidence where the user gave the head; it exceeds all other evidence.
 const GIVEN_HEAD_EVIDENCE: f64 = 1e6;
 
@@ -43,14 +46,27 @@ struct SwitchCosts {
 /// Decides for every frame with an axis; other frames get `None`.
 ///
 /// `speed_along` is the speed toward +axis, body lengths per second. `ends` is the evidence of the ends for
-/// +axis, half the log-odds.
+/// +axis, half the log-odds. A frame counts as its share of an independent moment.
 pub(super) fn decode(
     axes: &[Option<Axes>],
     speed_along: &[Option<f64>],
     ends: &[Option<f64>],
     given_head: Option<GivenHead>,
+    fps: f64,
 ) -> Vec<Option<Head>> {
-    let evidence = evidence(axes, speed_along, ends, given_head);
+    let share = (1.0 / (INDEPENDENT_S * fps)).min(1.0);
+    let evidence = |k: usize| {
+        axes[k].as_ref()?.axis_rad?;
+        let speed = speed_along[k].unwrap_or(0.0);
+        let motion = (speed / UNIT_SPEED_BL_S).clamp(-MAX_MOTION_EVIDENCE, MAX_MOTION_EVIDENCE);
+        let given = match given_head.filter(|head| head.frame_idx == k) {
+            Some(head) if head.forward => GIVEN_HEAD_EVIDENCE,
+            Some(_) => -GIVEN_HEAD_EVIDENCE,
+            None => 0.0,
+        };
+        Some(share * (motion + ends[k].unwrap_or(0.0)) + given)
+    };
+    let evidence: Vec<Option<f64>> = (0..axes.len()).map(evidence).collect();
     let seen: Vec<usize> = (0..axes.len()).filter(|&k| evidence[k].is_some()).collect();
     let emissions: Vec<f64> = seen.iter().filter_map(|&k| evidence[k]).collect();
     let seen_axes: Vec<&Axes> = seen.iter().filter_map(|&k| axes[k].as_ref()).collect();
@@ -84,27 +100,6 @@ pub(super) fn least_turn(axes: &[Option<Axes>]) -> Vec<Option<Head>> {
         })
     };
     axes.iter().map(&mut head).collect()
-}
-
-/// Returns the evidence for the head toward +axis in each frame: minus the emission cost of that state.
-fn evidence(
-    axes: &[Option<Axes>],
-    speed_along: &[Option<f64>],
-    ends: &[Option<f64>],
-    given_head: Option<GivenHead>,
-) -> Vec<Option<f64>> {
-    let evidence_at = |k: usize| {
-        axes[k].as_ref()?.axis_rad?;
-        let speed = speed_along[k].unwrap_or(0.0);
-        let motion = (speed / UNIT_SPEED_BL_S).clamp(-MAX_MOTION_EVIDENCE, MAX_MOTION_EVIDENCE);
-        let given = match given_head.filter(|head| head.frame_idx == k) {
-            Some(head) if head.forward => GIVEN_HEAD_EVIDENCE,
-            Some(_) => -GIVEN_HEAD_EVIDENCE,
-            None => 0.0,
-        };
-        Some(motion + ends[k].unwrap_or(0.0) + given)
-    };
-    (0..axes.len()).map(evidence_at).collect()
 }
 
 /// Returns the speed along +axis in each frame, body lengths per second.
@@ -254,7 +249,13 @@ mod tests {
         given_head: Option<GivenHead>,
     ) -> Vec<Option<Head>> {
         let ends = vec![None; axes.len()];
-        decode(axes, &speed_along(axes, velocity, 60.0), &ends, given_head)
+        decode(
+            axes,
+            &speed_along(axes, velocity, 60.0),
+            &ends,
+            given_head,
+            30.0,
+        )
     }
 
     fn errors(headings: &[f64], axes: &[Option<Axes>], heads: &[Option<Head>]) -> usize {

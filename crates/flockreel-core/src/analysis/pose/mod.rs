@@ -77,9 +77,13 @@ pub fn measure(track: &[Tracked], view: View, format: &FootageFormat, params: &P
     let speed_bl_s = heading::speed_along(&axes, &velocity_px, length_px);
     let appearance = HeadEvidence::estimate(track, &axes, &speed_bl_s, format.fps);
     let heads = match params.axis_and_head {
-        AxisAndHead::Corrected => {
-            heading::decode(&axes, &speed_bl_s, &appearance.half_log_odds, given_head)
-        }
+        AxisAndHead::Corrected => heading::decode(
+            &axes,
+            &speed_bl_s,
+            &appearance.half_log_odds,
+            given_head,
+            format.fps,
+        ),
         AxisAndHead::Printed => heading::least_turn(&axes),
     };
     let mut poses = Poses {
