@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
 
+use super::animated_ending;
 use crate::media::container::Container;
 
 /// The end of a file in relation to its structure.
@@ -44,6 +45,8 @@ impl Ending {
             Container::Asf => bytes.ending_of_asf(),
             Container::Flv => bytes.ending_of_flv(),
             Container::Ogg => bytes.ending_of_ogg(),
+            Container::Gif => animated_ending::ending_of_gif(file),
+            Container::Apng => animated_ending::ending_of_apng(file),
             // A sequence of packets without an overall structure.
             Container::MpegTs | Container::MpegPs | Container::H264 | Container::Hevc => {
                 Ok(Ending::Whole)
@@ -352,6 +355,8 @@ mod tests {
             Container::Asf,
             Container::Flv,
             Container::Ogg,
+            Container::Gif,
+            Container::Apng,
         ] {
             for byte in [0x00, 0x01, 0x7f, 0x80, 0xff] {
                 ending(container, &[byte; 70_000]);

@@ -16,7 +16,7 @@ use crate::media::tools::{Tool, installed};
 use flockreel_core::raster::{ColorSpec, Matrix, Range};
 
 /// Accepted codecs, by ffprobe's names.
-const CODECS: [&str; 21] = [
+const CODECS: [&str; 23] = [
     "h264",
     "hevc",
     "vp8",
@@ -38,6 +38,8 @@ const CODECS: [&str; 21] = [
     "theora",
     "flv1",
     "h263", // the codec of many .3gp files
+    "gif",
+    "apng",
 ];
 
 /// The entries requested from ffprobe.

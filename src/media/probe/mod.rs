@@ -4,6 +4,7 @@
 //! Two runs of ffprobe read the headers and the timestamps of all video packets. A third run decodes the
 //! film, if the packets do not determine its pictures. Numbers in the header are treated as claims.
 
+mod animated_ending; // detection of cut GIF and APNG files
 mod ending; // detection of files that are cut off
 pub(in crate::media) mod header; // stream headers
 mod mov_index; // check of the index of an MP4 file
