@@ -96,6 +96,8 @@ impl Film {
         let probe = &self.probe;
         let threads = self.n_threads().to_string();
         let mut input = vec!["-nostdin", "-copyts", "-noautorotate", "-threads", &threads];
+        // Otherwise ffmpeg rounds the left border of a crop down.
+        input.extend(["-flags", "unaligned"]);
         if matches!(selection, FrameSelection::OnePerPart { .. }) {
             input.extend(["-skip_frame", "noref"]);
         }

@@ -30,27 +30,32 @@ pub(super) fn is_animated_webp(head: &[u8]) -> bool {
 /// Each picture is a chunk `ANMF`. Its bytes 12 to 14 are the duration of the picture.
 pub(super) fn times_s(file: &mut (impl Read + Seek), limits: &Limits) -> Result<Vec<f64>, Error> {
     let n_bytes = file.seek(SeekFrom::End(0)).map_err(from_io)?;
+    let mut head = [0; 23];
+    let mut read_at = |place, bytes: &mut [u8]| {
+        file.seek(SeekFrom::Start(place))
+            .and_then(|_| file.read_exact(bytes))
+            .map_err(from_io)
+    };
+    let length_in =
+        |head: &[u8]| u64::from(u32::from_le_bytes([head[4], head[5], head[6], head[7]]));
+    read_at(0, &mut head[..8])?;
+    let end = 8 + length_in(&head);
+    if end > n_bytes {
+        return Err(Error::NotAVideo("the WebP is cut off".to_owned()));
+    }
     let (mut times_s, mut time_ms, mut place) = (Vec::new(), 0_u64, 12);
-    while place + 8 <= n_bytes {
-        let mut head = [0; 23];
-        file.seek(SeekFrom::Start(place)).map_err(from_io)?;
-        file.read_exact(&mut head[..8]).map_err(from_io)?;
-        let length = u64::from(u32::from_le_bytes([head[4], head[5], head[6], head[7]]));
-        place += 8 + length + length % 2;
-        if place > n_bytes {
-            return Err(Error::NotAVideo(format!(
-                "the WebP is cut off after picture {}",
-                times_s.len()
-            )));
-        }
+    while place + 8 <= end {
+        read_at(place, &mut head[..8])?;
         if &head[..4] == b"ANMF" {
-            file.read_exact(&mut head[8..]).map_err(from_io)?;
+            read_at(place, &mut head)?;
             times_s.push(time_ms as f64 / 1000.0);
             limits.check_n_frames(times_s.len())?;
             let duration_ms = u32::from_le_bytes([head[20], head[21], head[22], 0]);
             let is_unset = duration_ms <= MAX_UNSET_MS;
             time_ms += u64::from(if is_unset { UNSET_MS } else { duration_ms });
         }
+        let length = length_in(&head);
+        place += 8 + length + length % 2;
     }
     Ok(times_s)
 }
@@ -134,6 +139,8 @@ mod tests {
             bytes.extend(*contents);
             bytes.extend(&[0][..contents.len() % 2]);
         }
+        let n_bytes = bytes.len() as u32 - 8;
+        bytes[4..8].copy_from_slice(&n_bytes.to_le_bytes());
         bytes
     }
 
@@ -154,11 +161,12 @@ mod tests {
     #[test]
     fn times_follow_from_durations_and_unset_ones_are_those_of_browsers() {
         let pictures = [40, 0, 70, 10, 50].map(shown_for);
-        let chunks: Vec<(&[u8; 4], &[u8])> = pictures
-            .iter()
-            .map(|picture| (b"ANMF", &picture[..]))
+        let pictures = pictures.iter().map(|picture| (b"ANMF", &picture[..]));
+        let chunks: Vec<(&[u8; 4], &[u8])> = [(b"ICCP", &[1; 7][..])]
+            .into_iter()
+            .chain(pictures)
             .collect();
-        let bytes = [webp(&[(b"ICCP", &[1; 7])]), webp(&chunks)[12..].to_vec()].concat();
+        let bytes = webp(&chunks);
         let times = |bytes: &[u8]| times_s(&mut Cursor::new(bytes), &Limits::default());
         assert_eq!(times(&bytes).ok(), Some(vec![0.0, 0.04, 0.14, 0.21, 0.31]));
         assert!(matches!(

@@ -152,6 +152,9 @@ fn judge(
     if !limits.allow_truncated {
         notices.extend(file.notice(n_pictures));
     }
+    let has_plain_times = times.has_plain_times && notices.is_empty();
+    let hdr = header::hdr_transfer(stream);
+    notices.extend(hdr.map(|transfer| Notice::HighDynamicRange { transfer }));
     Ok(Probe {
         container: file.container,
         stream_idx: index_of(stream),
@@ -170,7 +173,7 @@ fn judge(
         has_alpha: has_alpha(stream),
         interlaced: is_interlaced(stream),
         n_pictures,
-        has_plain_times: times.has_plain_times && notices.is_empty(),
+        has_plain_times,
         timeline,
         notices,
     })

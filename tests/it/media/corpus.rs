@@ -142,8 +142,8 @@ impl Corpus<'_> {
             ),
             ("-c:v utvideo", "ut.avi", Code::CodecNotAllowed),
             ("-update 1", "still.tiff", Code::TooFewFrames),
-            ("-c:v gif", "film.gif", Code::NotAVideo),
-            ("-c:v libwebp -loop 0", "film.webp", Code::NotAVideo),
+            ("-update 1", "still.gif", Code::TooFewFrames),
+            ("-c:v libwebp", "still.webp", Code::NotAVideo),
         ] {
             let film = self.film(10, &format!("{args} {name}"));
             self.refused(film, &[code]);
