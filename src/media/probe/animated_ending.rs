@@ -3,25 +3,23 @@
 use std::fs::File;
 use std::io::{self, BufReader, ErrorKind, Read, Seek};
 
-use super::ending::Ending;
-
 /// Maximum number of blocks or chunks examined. A picture of a GIF has one per 255 bytes.
 const MAX_BLOCKS: usize = 20_000_000;
 
-/// Returns how a GIF ends. Fails only if reading fails.
-pub(super) fn ending_of_gif(file: &File) -> io::Result<Ending> {
-    ending(walk_gif(BufReader::new(file)))
+/// Returns whether a GIF is cut off. Fails only if reading fails.
+pub(super) fn is_cut_gif(file: &File) -> io::Result<bool> {
+    is_cut(walk_gif(BufReader::new(file)))
 }
 
-/// Returns how an APNG ends. Fails only if reading fails.
-pub(super) fn ending_of_apng(file: &File) -> io::Result<Ending> {
-    ending(walk_apng(BufReader::new(file)))
+/// Returns whether an APNG is cut off. Fails only if reading fails.
+pub(super) fn is_cut_apng(file: &File) -> io::Result<bool> {
+    is_cut(walk_apng(BufReader::new(file)))
 }
 
-fn ending(walk: io::Result<()>) -> io::Result<Ending> {
+fn is_cut(walk: io::Result<()>) -> io::Result<bool> {
     match walk {
-        Ok(()) => Ok(Ending::Whole),
-        Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(Ending::InsideData),
+        Ok(()) => Ok(false),
+        Err(error) if error.kind() == ErrorKind::UnexpectedEof => Ok(true),
         Err(error) => Err(error),
     }
 }
