@@ -377,8 +377,6 @@ EXPECTED = {
     "exif_turned": SOUND,
     "thumbnail_first-wmv": SOUND,
     "moving_pictures": SOUND,
-    "moving_pictures-webp": {"either": [SOUND, {"refused": ["not_a_video", "container_not_allowed", "codec_not_allowed"],
-                                                "says": "[Cc]onvert"}]},
     # No tool reads a file without index, so a conversion with ffmpeg cannot be the advice.
     "unfinished_recording": {"refused": ["truncated"], "never_says": "ffmpeg -i"},
     "hard": SOUND,

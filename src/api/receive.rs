@@ -37,7 +37,7 @@ const FILM_TYPES: [&str; 5] = [
     "video/",
     "application/octet-stream",
     "application/zip",
-    "image/tiff",
+    "image/", // TIFF, and animated GIF, PNG and WebP
 ];
 /// Largest background picture, bytes. Free choice.
 const MAX_BACKGROUND_BYTES: u64 = 64 << 20;

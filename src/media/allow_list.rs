@@ -8,11 +8,11 @@ use super::container::Container;
 use super::limits::Limits;
 
 /// Allowed demuxers. `Container` selects one of them; ffmpeg enforces this list as well.
-const FORMATS: &str = "mov,matroska,avi,mpegts,asf,mpeg,flv,ogg,h264,hevc";
+const FORMATS: &str = "mov,matroska,avi,mpegts,asf,mpeg,flv,ogg,gif,apng,h264,hevc";
 
 /// Allowed video decoders, by ffmpeg's names.
 const DECODERS: &str = "h264,hevc,vp8,vp9,libvpx,libvpx-vp9,av1,libdav1d,libaom-av1,mpeg4,mpeg2video,mjpeg,prores,\
-                        ffv1,rawvideo,wmv2,wmv3,vc1,mpeg1video,huffyuv,ffvhuff,png,theora,flv,h263";
+                        ffv1,rawvideo,wmv2,wmv3,vc1,mpeg1video,huffyuv,ffvhuff,png,theora,flv,h263,gif,apng";
 
 /// Allowed decoders of audio and subtitles. None of these streams is used, but ffprobe fails on a file if it
 /// may not open one of its streams.

@@ -7,7 +7,7 @@ use super::error::Error;
 use super::tools::query_ffmpeg;
 
 /// Decoders by the format they read. The first one available is used.
-const DECODERS: [(&str, &[&str]); 14] = [
+const DECODERS: [(&str, &[&str]); 16] = [
     ("H.264", &["h264"]),
     ("H.265", &["hevc"]),
     ("VP8", &["vp8"]),
@@ -22,6 +22,8 @@ const DECODERS: [(&str, &[&str]); 14] = [
     ("WMV 8", &["wmv2"]),
     ("WMV 9", &["wmv3"]),
     ("VC-1", &["vc1"]),
+    ("GIF", &["gif"]),
+    ("APNG", &["apng"]),
 ];
 
 /// Encoders, each with the effect of its absence.
@@ -96,6 +98,6 @@ mod tests {
         assert_eq!(codecs.available, ["vp9", "libaom-av1", "gif"]);
         let h264 = codecs.missing.iter().find(|(name, _)| *name == "h264");
         assert_eq!(h264.unwrap().1, "footage in H.264 is refused");
-        assert_eq!(codecs.missing.len(), 14 + 5 - 3);
+        assert_eq!(codecs.missing.len(), 16 + 5 - 3);
     }
 }

@@ -26,6 +26,10 @@ pub(super) enum Container {
     Flv,
     /// Ogg.
     Ogg,
+    /// GIF: animated, or a still picture.
+    Gif,
+    /// Animated PNG.
+    Apng,
     /// H.264 elementary stream: no container and no timestamps.
     H264,
     /// H.265 elementary stream: no container and no timestamps.
@@ -33,12 +37,11 @@ pub(super) enum Container {
 }
 
 /// Signatures of files that are not video: (offset, bytes, kind).
-const PICTURES: [(usize, &[u8], &str); 6] = [
+const PICTURES: [(usize, &[u8], &str); 5] = [
     (0, b"\x89PNG", "a still image"),
     (0, b"\xff\xd8\xff", "a still image"),
     (0, b"BM", "a still image"),
     (8, b"WEBP", "a still image"),
-    (0, b"GIF8", "an image"),
     (0, b"%PDF", "a document"),
 ];
 
@@ -102,6 +105,12 @@ impl Container {
         if has(0, b"OggS\0") {
             return Ok(Container::Ogg);
         }
+        if has(0, b"GIF87a") || has(0, b"GIF89a") {
+            return Ok(Container::Gif);
+        }
+        if is_animated_png(head) {
+            return Ok(Container::Apng);
+        }
         if let Some(stream) = elementary_stream(head) {
             return Ok(stream);
         }
@@ -131,6 +140,8 @@ impl Container {
             Container::MpegPs => "mpeg",
             Container::Flv => "flv",
             Container::Ogg => "ogg",
+            Container::Gif => "gif",
+            Container::Apng => "apng",
             Container::H264 => "h264",
             Container::Hevc => "hevc",
         }
@@ -164,6 +175,22 @@ fn elementary_stream(head: &[u8]) -> Option<Container> {
         }
         _ => None,
     })
+}
+
+/// Returns whether a PNG has the chunk `acTL` of an animation before its first picture.
+fn is_animated_png(head: &[u8]) -> bool {
+    let mut rest = head.strip_prefix(b"\x89PNG\r\n\x1a\n");
+    while let Some([a, b, c, d, name @ ..]) = rest {
+        if name.starts_with(b"acTL") {
+            return true;
+        }
+        let length = u32::from_be_bytes([*a, *b, *c, *d]) as usize;
+        // Length, name and checksum take 12 bytes.
+        let is_before_picture = !name.starts_with(b"IDAT");
+        rest = rest.filter(|_| is_before_picture);
+        rest = rest.and_then(|chunk| chunk.get(length.saturating_add(12)..));
+    }
+    false
 }
 
 /// Returns whether the file begins with a known QuickTime box of a plausible size.

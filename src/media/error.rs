@@ -6,17 +6,31 @@ use std::io;
 use flockreel_core::code::Code;
 use flockreel_core::footage::SourceError;
 
-/// The missing part of a damaged film.
+/// How to make an index. Converters need one.
+const REPAIR: &str = "use the repair function of the camera, or the program untrunc with a complete film of the same \
+                      camera";
+
+/// How to keep the pictures that can be read.
+const KEEP: &str = "keep the rest with `ffmpeg -i film -an -c:v libx264 -crf 16 rest.mp4`";
+
+/// The missing part of a damaged film, and what to do without a complete copy.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Damage {
     /// The index that locates the pictures is missing.
-    #[error("the index is missing")]
+    #[error(
+        "the index is missing, as after a recording that was not finished, and no program finds the pictures without it: \
+         {}",
+        REPAIR
+    )]
     NoIndex,
     /// The index that locates the pictures is incomplete or points beyond the end of the file.
-    #[error("the index is damaged")]
+    #[error("the index is damaged, so pictures cannot be found: {}", REPAIR)]
     BrokenIndex,
     /// The file ends before its own structure does.
-    #[error("the pictures end after {span_s:.1} s, at picture {n_pictures}")]
+    #[error(
+        "the pictures end after {span_s:.1} s, at picture {n_pictures}: {}",
+        KEEP
+    )]
     EndsAt {
         /// Number of pictures found.
         n_pictures: usize,
@@ -24,7 +38,7 @@ pub enum Damage {
         span_s: f64,
     },
     /// Some pictures cannot be decoded.
-    #[error("only {n_decoded} of {n_pictures} pictures can be decoded")]
+    #[error("only {n_decoded} of {n_pictures} pictures can be decoded: {}", KEEP)]
     Undecodable {
         /// Number of decoded pictures.
         n_decoded: usize,
@@ -66,7 +80,8 @@ pub enum Error {
     },
     /// The pictures have different sizes.
     #[error(
-        "the pictures differ in size: picture {number} has {}x{} pixels, the first {}x{}",
+        "the pictures differ in size: picture {number} is shown with {}x{} pixels, the first with {}x{}: scale, crop or \
+         turn them to one size",
         found[0], found[1], first[0], first[1]
     )]
     PicturesDiffer {

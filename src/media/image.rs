@@ -4,7 +4,8 @@
 use std::io::{Cursor, Read};
 use std::path::Path;
 
-use image::{DynamicImage, ImageError, ImageFormat, ImageReader};
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use super::error::Error;
 use super::limits::Limits;
@@ -26,7 +27,7 @@ pub fn read_image(path: &Path, limits: &Limits) -> Result<RgbImage, Error> {
 /// Fails with `not_a_video` for other formats and damaged files, with `too_long` for too many bytes, and with
 /// `too_many_pixels` or `too_few_pixels`.
 pub fn decode_image(bytes: &[u8], limits: &Limits) -> Result<RgbImage, Error> {
-    let image = decode(bytes, &[ImageFormat::Png, ImageFormat::Jpeg], limits)?;
+    let image = decode_any(bytes, &[ImageFormat::Png, ImageFormat::Jpeg], limits)?;
     let (width, height) = (image.width(), image.height());
     Ok(RgbImage {
         width,
@@ -35,8 +36,8 @@ pub fn decode_image(bytes: &[u8], limits: &Limits) -> Result<RgbImage, Error> {
     })
 }
 
-/// Decodes a picture of one of the given formats. Limits are checked before decoding.
-pub(super) fn decode(
+/// Decodes a picture of one of the given formats, and turns it as its EXIF data say. Limits are checked before decoding.
+pub(super) fn decode_any(
     bytes: &[u8],
     formats: &[ImageFormat],
     limits: &Limits,
@@ -62,7 +63,12 @@ pub(super) fn decode(
     bounds.max_image_height = Some(limits.max_side_px);
     bounds.max_alloc = Some(limits.max_pixels * 16);
     reader.limits(bounds);
-    reader.decode().map_err(from_image)
+    let mut decoder = reader.into_decoder().map_err(from_image)?;
+    // EXIF data that cannot be read hold no orientation.
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut image = DynamicImage::from_decoder(decoder).map_err(from_image)?;
+    image.apply_orientation(orientation);
+    Ok(image)
 }
 
 fn from_image(error: ImageError) -> Error {

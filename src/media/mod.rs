@@ -1,7 +1,7 @@
 //! Reading and writing of video files, by ffmpeg as a sandboxed child process (docs/explanation/promises.md,
 //! "Confined media tools"). A crash or exploit of a decoder cannot reach this process.
 //!
-//! Still pictures are the exception: libraries without unsafe C code decode them in this process.
+//! Pictures are the exception: libraries without unsafe C code decode them, and animated WebP, in this process.
 //!
 //! [`Video`] checks a file when it is opened. Its size, frame rate and length are then within the [`Limits`].
 //! Its frames are planar YUV 4:2:0 at a constant rate.
@@ -19,7 +19,7 @@ mod image; // still pictures, such as a background
 mod invocation; // one run of a media tool
 mod limits;
 mod notice; // notices about accepted footage
-mod pictures; // folder, zip or TIFF of pictures -> frames
+mod pictures; // folder, zip, TIFF or animated WebP -> frames
 mod probe; // contents of a file: headers, packets, pictures, times
 mod read_options; // metadata given by the user
 mod sandbox; // sandbox of a child

@@ -43,6 +43,17 @@ pub enum Notice {
         /// Assumed frame rate, frames per second.
         fps: f64,
     },
+    /// The film is HDR. ffmpeg's tone mapping computes in floating point, with other bytes on other processors, so it is
+    /// left to the user.
+    #[error(
+        "The film is HDR ({transfer}), and its colors look pale. This does not harm the measurement. For flocks with true \
+         colors convert the film: `ffmpeg -i film -an -vf zscale=t=linear:npl=100,format=gbrpf32le,zscale=p=bt709,\
+         tonemap=hable,zscale=t=bt709:m=bt709:r=tv,format=yuv420p -c:v libx264 -crf 16 sdr.mp4`."
+    )]
+    HighDynamicRange {
+        /// The standard.
+        transfer: &'static str,
+    },
     /// Gray of more than 8 bits was reduced to 8 bits.
     #[error(
         "The pictures use gray levels {black} to {white} of 0 to {max}. These levels were stretched to black and white."
@@ -65,6 +76,7 @@ impl Notice {
             Notice::IndexDamaged { .. } => "index_damaged",
             Notice::TimesLeap { .. } => "times_leap",
             Notice::RateAssumed { .. } => "rate_assumed",
+            Notice::HighDynamicRange { .. } => "high_dynamic_range",
             Notice::GrayStretched { .. } => "gray_stretched",
         }
     }

@@ -1,4 +1,4 @@
-//! Footage of any kind: a video file, decoded by a child process, or still pictures, decoded in this process.
+//! Footage of any kind: a video file, decoded by a child process, or pictures, decoded in this process.
 
 use std::path::{Path, PathBuf};
 
@@ -26,8 +26,8 @@ impl Video {
         Video::open_with(path, limits, &ReadOptions::default())
     }
 
-    /// Opens a video file, a zip of pictures, a TIFF of several pages or a folder of pictures. `options`
-    /// override the file's own metadata.
+    /// Opens a video file, an animated GIF, PNG or WebP, a zip of pictures, a TIFF of several pages or a folder of
+    /// pictures. `options` override the file's own metadata.
     ///
     /// Fails with the reason of the first limit that the footage exceeds. `path` comes from the store or from
     /// the command line, never from the name of an uploaded file.

@@ -38,9 +38,9 @@ macro_rules! codes {
 codes! {
     // Input files (docs/explanation/promises.md, "Bad input").
     NotAVideo "not_a_video" "The file is not a video that can be read."
-        "Send a video file: MP4, MOV, 3GP, MKV, WebM, AVI, MPEG, MPEG-TS, ASF, WMV, FLV, OGV, H.264 or H.265. A \
-         playlist is not a video. Send still pictures as a zip of numbered PNG, JPEG, BMP or TIFF files, or as one \
-         TIFF with several pages; the command line also takes a folder."
+        "Send a video file: MP4, MOV, 3GP, MKV, WebM, AVI, MPEG, MPEG-TS, ASF, WMV, FLV, OGV, H.264, H.265, or an \
+         animated GIF, PNG or WebP. A playlist is not a video. Send still pictures as a zip of numbered PNG, JPEG, BMP, \
+         WebP or TIFF files, or as one TIFF with several pages; the command line also takes a folder."
     ContainerNotAllowed "container_not_allowed" "The container format is not supported."
         "Convert it, for example with `ffmpeg -i film -an -c:v libx264 -crf 16 converted.mp4`."
     CodecNotAllowed "codec_not_allowed" "The video codec is not supported."
@@ -60,8 +60,8 @@ codes! {
         "Reduce the frame rate, for example with `ffmpeg -i film -an -r 60 -c:v libx264 -crf 16 slower.mp4`, or set \
          the true rate, for example with `--fps 240`."
     Truncated "truncated" "The file is incomplete or damaged."
-        "Copy the file from the camera again. If no complete copy exists, send the readable part, for example with \
-         `ffmpeg -i film -an -c:v libx264 -crf 16 rest.mp4`."
+        "Copy the file from the camera again. If no complete copy exists, the message of the error says what else helps: \
+         it depends on the missing part."
     Encrypted "encrypted" "The video is encrypted."
         "Send it without copy protection."
     NoVideoStream "no_video_stream" "The file holds no video stream."

@@ -28,12 +28,15 @@ static FOLDER: LazyLock<TempDir> =
 
 fn is_pictures(bytes: &[u8]) -> bool {
     // A film would start ffprobe. The target `probe` reads its output.
-    [&b"PK\x03\x04"[..], b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]
-        .iter()
-        .any(|magic| bytes.starts_with(magic))
+    let is_animated_webp =
+        bytes.get(8..16) == Some(b"WEBPVP8X") && bytes.get(20).is_some_and(|b| b & 2 > 0);
+    is_animated_webp
+        || [&b"PK\x03\x04"[..], b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"]
+            .iter()
+            .any(|magic| bytes.starts_with(magic))
 }
 
-/// Footage of pictures (zip or TIFF), or one picture: a background.
+/// Footage of pictures (zip, TIFF or WebP), or one picture: a background.
 pub(super) fn pictures(bytes: &[u8]) {
     if !is_pictures(bytes) {
         media::decode_image(bytes, &limits()).map(drop).ok();

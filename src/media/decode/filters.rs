@@ -39,10 +39,10 @@ pub(super) fn filters(
     if is_rgb(&probe.pix_fmt) && !probe.alpha_as_gray {
         scale += ":out_range=tv:out_color_matrix=bt601"
     } else {
-        let stored = if probe.color_space.starts_with("bt2020") {
-            "bt2020"
-        } else {
-            matrix
+        let stored = match &*probe.color_space {
+            "bt2020nc" | "bt2020c" => "bt2020",
+            space @ ("smpte240m" | "fcc") => space,
+            _ => matrix,
         };
         scale += &format!(
             ":in_range={range}:out_range={range}:in_color_matrix={stored}:out_color_matrix={matrix}"

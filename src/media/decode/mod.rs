@@ -96,6 +96,8 @@ impl Film {
         let probe = &self.probe;
         let threads = self.n_threads().to_string();
         let mut input = vec!["-nostdin", "-copyts", "-noautorotate", "-threads", &threads];
+        // Otherwise ffmpeg rounds the left border of a crop down.
+        input.extend(["-flags", "unaligned"]);
         if matches!(selection, FrameSelection::OnePerPart { .. }) {
             input.extend(["-skip_frame", "noref"]);
         }
@@ -189,13 +191,9 @@ impl FrameSource for Film {
             }
         }
         let frames = spread_idx(format.n_frames_hint, n);
-        let decoded = match &self.probe.timeline {
-            Timeline::Constant { .. } => frames,
-            Timeline::Variable { sources, .. } => {
-                frames.iter().map(|&idx| sources[idx] as usize).collect()
-            }
-        };
-        self.visit_frames(&FrameSelection::Indices(decoded), visit)?;
+        let at = |idx| self.probe.timeline.picture_at(idx, n_pictures);
+        let decoded = frames.into_iter().filter_map(at).map(|(idx, _)| idx);
+        self.visit_frames(&FrameSelection::Indices(decoded.collect()), visit)?;
         Ok(())
     }
 }
@@ -213,22 +211,16 @@ struct FilmStream<'a> {
 impl FrameStream for FilmStream<'_> {
     fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
         let probe = &self.film.probe;
-        let time_s = match &probe.timeline {
-            Timeline::Constant { fps, late_s } => {
-                let first_late = probe.n_pictures - late_s.len();
-                let late = self
-                    .n_returned
-                    .checked_sub(first_late)
-                    .and_then(|k| late_s.get(k));
-                let time_s = late.copied().unwrap_or(self.n_returned as f64 / fps);
-                self.decode(frame)?.then_some(time_s)
+        let shown = probe.timeline.picture_at(self.n_returned, probe.n_pictures);
+        let is_decoded = match &probe.timeline {
+            Timeline::Constant { .. } => self.decode(frame)?,
+            // After the last frame the rest of the film is decoded, which shows whether it is whole.
+            Timeline::Variable { .. } => {
+                self.decode_to(shown.map_or(usize::MAX, |(idx, _)| idx), frame)?
             }
-            Timeline::Variable {
-                times_s, sources, ..
-            } => self.resample(times_s, sources, frame)?,
         };
-        self.n_returned += usize::from(time_s.is_some());
-        Ok(time_s)
+        self.n_returned += usize::from(is_decoded);
+        Ok(shown.filter(|_| is_decoded).map(|(_, time_s)| time_s))
     }
 }
 
@@ -286,24 +278,17 @@ impl<'a> FilmStream<'a> {
         }
     }
 
-    /// Returns the next frame at the constant rate. It may repeat the last frame or skip some.
-    fn resample(
-        &mut self,
-        times_s: &[f64],
-        sources: &[u32],
-        frame: &mut Frame,
-    ) -> Result<Option<f64>, Error> {
-        let source = sources.get(self.n_returned);
-        let source_idx = source.map_or(usize::MAX, |&source| source as usize);
+    /// Decodes up to a picture, which may be the last one again. Returns false if there is none.
+    fn decode_to(&mut self, picture_idx: usize, frame: &mut Frame) -> Result<bool, Error> {
         let mut last_frame = std::mem::take(&mut self.last_frame);
-        while self.n_decoded <= source_idx {
+        while self.n_decoded <= picture_idx {
             if !self.decode(&mut last_frame)? {
-                return Ok(None);
+                return Ok(false);
             }
         }
         frame.clone_from(&last_frame);
         self.last_frame = last_frame;
-        Ok(times_s.get(source_idx).copied())
+        Ok(true)
     }
 
     /// Handles the end of the output, `n_left` bytes after the last complete frame.

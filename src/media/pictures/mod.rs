@@ -1,10 +1,11 @@
-//! Still pictures as footage: a folder, a zip, or the pages of one TIFF, as microscopes and lab cameras write
-//! them. Libraries without unsafe C code decode each picture on request, under the same limits as films.
-//! Pictures have no frame rate: the user gives one, or it is assumed.
+//! Pictures as footage: a folder, a zip, or the pages of one TIFF, as microscopes and lab cameras write them, or an
+//! animated WebP. Libraries without unsafe C code decode each picture on request, under the same limits as films.
+//! Still pictures have no frame rate: the user gives one, or it is assumed.
 
+mod animation; // animated WebP
 mod natural_order; // order of numbered names
 mod picture; // decoding of one picture
-mod source; // pictures of a folder, zip or TIFF
+mod source; // pictures of a folder, zip, TIFF or animation
 mod tiff_stack; // pages of a TIFF
 
 use std::path::{Path, PathBuf};
@@ -24,6 +25,9 @@ use flockreel_core::raster::{Frame, RgbImage};
 use picture::Picture;
 use source::{Reader, Source};
 
+/// Resolution of the times of animated pictures, seconds.
+const TICK_S: f64 = 0.001;
+
 /// Pictures of one size, within the limits.
 #[derive(Clone, Debug)]
 pub(super) struct Pictures {
@@ -33,7 +37,7 @@ pub(super) struct Pictures {
     stored: [u32; 2],
     /// Width and height in square pixels.
     shown: [u32; 2],
-    fps: f64,
+    timeline: Timeline,
     /// Range of gray levels, if the first picture is gray of more than 8 bits.
     gray_range: Option<GrayRange>,
     /// Whether the first picture has an alpha channel.
@@ -44,8 +48,8 @@ pub(super) struct Pictures {
 }
 
 impl Pictures {
-    /// Opens the pictures at `path`: those of a folder, a zip or a TIFF; `None` for anything else. Decodes
-    /// the first one, and 16 if it is gray of 16 bits.
+    /// Opens the pictures at `path`: those of a folder, a zip, a TIFF or an animated WebP; `None` for
+    /// anything else. Decodes the first one, and 16 if it is gray of 16 bits.
     pub(super) fn open(
         path: &Path,
         limits: &Limits,
@@ -54,13 +58,12 @@ impl Pictures {
         let Some(source) = Source::find(path, limits)? else {
             return Ok(None);
         };
-        let n_pictures = source.n_pictures();
         let claims = Claims {
             fps: Vec::new(),
-            tick_s: 0.0,
+            tick_s: TICK_S,
             given_fps: options.fps,
         };
-        let (timeline, mut notices) = Timeline::new(&vec![None; n_pictures], &claims, limits)?;
+        let (timeline, mut notices) = Timeline::new(&source.times_s(), &claims, limits)?;
         let (first, has_alpha) = source.read(limits, false)?.picture(0)?;
         let stored = first.size();
         let shown = square_pixels(stored.map(f64::from), options.pixel_aspect);
@@ -71,7 +74,7 @@ impl Pictures {
             limits: limits.clone(),
             stored,
             shown,
-            fps: timeline.fps(),
+            timeline,
             gray_range: None,
             has_alpha,
             alpha_as_gray: options.alpha_as_gray,
@@ -117,6 +120,13 @@ impl Pictures {
         Ok(GrayRange::from_histogram(&counts))
     }
 
+    /// Returns the picture that a frame shows, and its time in seconds; `None` after the last frame.
+    fn picture_at(&self, frame_idx: usize) -> Option<(usize, f64)> {
+        let n_pictures = self.source.n_pictures();
+        let at = self.timeline.picture_at(frame_idx, n_pictures);
+        at.filter(|&(idx, _)| idx < n_pictures)
+    }
+
     /// Decodes a picture into a frame. Fails if its size differs from the first picture's.
     fn show(&self, reader: &mut Reader<'_>, idx: usize, frame: &mut Frame) -> Result<(), Error> {
         let (picture, _) = reader.picture(idx)?;
@@ -148,8 +158,8 @@ impl FrameSource for Pictures {
         FootageFormat {
             width,
             height,
-            fps: self.fps,
-            n_frames_hint: self.source.n_pictures(),
+            fps: self.timeline.fps(),
+            n_frames_hint: self.timeline.n_frames(self.source.n_pictures()),
             color: FULL_RANGE,
         }
     }
@@ -166,7 +176,10 @@ impl FrameSource for Pictures {
     fn spread(&self, n: usize, visit: &mut Visit<'_>) -> Result<(), SourceError> {
         let mut reader = self.source.read(&self.limits, self.alpha_as_gray)?;
         let mut frame = Frame::default();
-        for idx in spread_idx(self.source.n_pictures(), n) {
+        for frame_idx in spread_idx(self.format().n_frames_hint, n) {
+            let Some((idx, _)) = self.picture_at(frame_idx) else {
+                break;
+            };
             self.show(&mut reader, idx, &mut frame)?;
             if visit(&frame).is_break() {
                 break;
@@ -185,12 +198,11 @@ struct PictureStream<'a> {
 
 impl FrameStream for PictureStream<'_> {
     fn next_frame(&mut self, frame: &mut Frame) -> Result<Option<f64>, SourceError> {
-        let idx = self.n_returned;
-        if idx == self.pictures.source.n_pictures() {
+        let Some((idx, time_s)) = self.pictures.picture_at(self.n_returned) else {
             return Ok(None);
-        }
+        };
         self.pictures.show(&mut self.reader, idx, frame)?;
         self.n_returned += 1;
-        Ok(Some(idx as f64 / self.pictures.fps))
+        Ok(Some(time_s))
     }
 }

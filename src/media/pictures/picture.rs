@@ -1,7 +1,7 @@
 //! One decoded still picture, and its conversion to RGB.
 
 use image::imageops::{FilterType, resize};
-use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
+use image::{DynamicImage, GrayImage, ImageBuffer, Luma, Rgb, RgbImage};
 
 use crate::media::gray_range::GrayRange;
 
@@ -16,6 +16,27 @@ pub(super) enum Picture {
 }
 
 impl Picture {
+    /// Returns a picture without its alpha.
+    pub(super) fn new(image: DynamicImage) -> Picture {
+        match image {
+            DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
+                Picture::Gray(image.into_luma8())
+            }
+            DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => {
+                Picture::Gray16(image.into_luma16())
+            }
+            _ => Picture::Rgb(image.into_rgb8()),
+        }
+    }
+
+    /// Returns the alpha of a picture as gray, opaque if there is none.
+    pub(super) fn of_alpha(image: DynamicImage) -> Picture {
+        let rgba = image.into_rgba8();
+        Picture::Gray(GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| {
+            Luma([rgba.get_pixel(x, y).0[3]])
+        }))
+    }
+
     /// Returns width and height, pixels.
     pub(super) fn size(&self) -> [u32; 2] {
         let (width, height) = match self {

@@ -1,24 +1,25 @@
-//! Storage of still pictures: a folder, a zip, or the pages of a TIFF, with their order. A zip is never
+//! Storage of pictures: a folder, a zip, the pages of a TIFF, or an animated WebP, with their order. A zip is never
 //! unpacked to disk. Each picture is read from it directly, up to the size of the largest allowed picture.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader, Cursor, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use image::{DynamicImage, GrayImage, ImageFormat, Luma};
+use image::{DynamicImage, ImageFormat};
 use tiff::decoder::Decoder;
 use zip::ZipArchive;
 use zip::result::ZipError;
 
+use super::animation::{self, Animation};
 use super::natural_order::compare_natural;
 use super::picture::Picture;
 use super::tiff_stack;
 use crate::media::error::Error;
-use crate::media::image::decode;
+use crate::media::image::decode_any;
 use crate::media::limits::Limits;
 
 /// File name extensions of pictures.
-const EXTENSIONS: [&str; 6] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp"];
+const EXTENSIONS: [&str; 7] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp", "webp"];
 
 /// Allowed size of a zip directory per picture of the limit, bytes: an entry of 46, its name, and its date in
 /// extra fields. The directory is kept in memory.
@@ -33,11 +34,13 @@ pub(super) enum Source {
     Zip(PathBuf, Vec<usize>),
     /// A TIFF and its number of pages.
     Stack(PathBuf, usize),
+    /// An animated WebP and the times of its pictures, seconds from the first.
+    Animation(PathBuf, Vec<f64>),
 }
 
 impl Source {
-    /// Returns the pictures at `path`; `None` if it is neither a folder nor a zip nor a TIFF. Fails if there
-    /// are no pictures, or more than the limit.
+    /// Returns the pictures at `path`; `None` if it is neither a folder nor a zip nor a TIFF nor an
+    /// animated WebP. Fails if there are no pictures, or more than the limit.
     pub(super) fn find(path: &Path, limits: &Limits) -> Result<Option<Source>, Error> {
         let failed = Error::io("opening the footage");
         let about = fs::metadata(path).map_err(&failed)?;
@@ -45,10 +48,13 @@ impl Source {
             return files_of(path, limits).map(|files| Some(Source::Folder(files)));
         }
         let file = File::open(path).map_err(&failed)?;
-        let mut head = Vec::with_capacity(4);
-        (&file).take(4).read_to_end(&mut head).map_err(&failed)?;
+        let mut head = Vec::with_capacity(animation::HEAD_BYTES);
+        (&file)
+            .take(animation::HEAD_BYTES as u64)
+            .read_to_end(&mut head)
+            .map_err(&failed)?;
         let (is_zip, is_tiff) = (head.starts_with(b"PK\x03\x04"), tiff_stack::is_tiff(&head));
-        if !is_zip && !is_tiff {
+        if !is_zip && !is_tiff && !animation::is_animated_webp(&head) {
             return Ok(None);
         }
         limits.check_n_bytes(about.len())?;
@@ -57,6 +63,8 @@ impl Source {
         file.rewind().map_err(&failed)?;
         Ok(Some(if is_zip {
             Source::Zip(path, entries_of(file, limits)?)
+        } else if !is_tiff {
+            Source::Animation(path, animation::times_s(&mut file, limits)?)
         } else {
             Source::Stack(path, tiff_stack::n_pages(&mut file, limits)?)
         }))
@@ -68,6 +76,15 @@ impl Source {
             Source::Folder(files) => files.len(),
             Source::Zip(_, entries) => entries.len(),
             Source::Stack(_, n_pages) => *n_pages,
+            Source::Animation(_, times_s) => times_s.len(),
+        }
+    }
+
+    /// Returns the time of each picture, seconds from the first; `None` if it is unknown.
+    pub(super) fn times_s(&self) -> Vec<Option<f64>> {
+        match self {
+            Source::Animation(_, times_s) => times_s.iter().copied().map(Some).collect(),
+            _ => vec![None; self.n_pictures()],
         }
     }
 
@@ -75,7 +92,9 @@ impl Source {
     pub(super) fn files(&self) -> &[PathBuf] {
         match self {
             Source::Folder(files) => files,
-            Source::Zip(path, _) | Source::Stack(path, _) => std::slice::from_ref(path),
+            Source::Zip(path, _) | Source::Stack(path, _) | Source::Animation(path, _) => {
+                std::slice::from_ref(path)
+            }
         }
     }
 
@@ -97,6 +116,9 @@ impl Source {
             Source::Stack(path, _) => {
                 OpenSource::Stack(Box::new(tiff_stack::open(open(path)?, limits)?))
             }
+            Source::Animation(path, _) => {
+                OpenSource::Animation(Box::new(Animation::open(path, limits)?))
+            }
         };
         Ok(Reader {
             source,
@@ -117,19 +139,27 @@ enum OpenSource<'a> {
     Folder(&'a [PathBuf]),
     Zip(ZipArchive<BufReader<File>>, &'a [usize]),
     Stack(Box<Decoder<BufReader<File>>>),
+    Animation(Box<Animation<'a>>),
 }
 
 impl Reader<'_> {
-    /// Decodes a picture and returns whether it has an alpha channel. If it cannot be decoded, the error
-    /// names its number, counted from 1.
+    /// Decodes a picture, or its alpha, and returns whether it has an alpha channel. If it cannot be decoded, the
+    /// error names its number, counted from 1.
     pub(super) fn picture(&mut self, idx: usize) -> Result<(Picture, bool), Error> {
-        self.decode(idx).map_err(|error| match error {
+        let image = self.decode(idx).map_err(|error| match error {
             Error::NotAVideo(why) => Error::NotAVideo(format!("picture {}: {why}", idx + 1)),
             error => error,
-        })
+        })?;
+        let has_alpha = image.color().has_alpha();
+        let convert = if self.alpha_as_gray {
+            Picture::of_alpha
+        } else {
+            Picture::new
+        };
+        Ok((convert(image), has_alpha))
     }
 
-    fn decode(&mut self, idx: usize) -> Result<(Picture, bool), Error> {
+    fn decode(&mut self, idx: usize) -> Result<DynamicImage, Error> {
         let limits = self.limits;
         let bytes = match &mut self.source {
             OpenSource::Folder(files) => {
@@ -139,50 +169,26 @@ impl Reader<'_> {
             OpenSource::Zip(archive, entries) => {
                 bytes_of(archive.by_index(entries[idx]).map_err(from_zip)?, limits)?
             }
-            OpenSource::Stack(pages) => {
-                return tiff_stack::page(pages, idx, limits).map(|page| (page, false));
-            }
+            OpenSource::Stack(pages) => return tiff_stack::page(pages, idx, limits),
+            OpenSource::Animation(animation) => return animation.picture(idx, limits),
         };
-        decode_picture(&bytes, limits, self.alpha_as_gray)
+        decode(&bytes, limits)
     }
 }
 
-/// Decodes a PNG, JPEG, BMP or the first page of a TIFF. Returns the picture and whether it has an alpha
-/// channel.
-///
-/// With `alpha_as_gray` the picture is the alpha instead, opaque if there is none. The alpha of a TIFF is
-/// ignored.
-fn decode_picture(
-    bytes: &[u8],
-    limits: &Limits,
-    alpha_as_gray: bool,
-) -> Result<(Picture, bool), Error> {
+/// Decodes a PNG, JPEG, BMP, WebP or the first page of a TIFF. The alpha of a TIFF is ignored.
+fn decode(bytes: &[u8], limits: &Limits) -> Result<DynamicImage, Error> {
     if tiff_stack::is_tiff(bytes) {
         let mut pages = tiff_stack::open(Cursor::new(bytes), limits)?;
-        return Ok((tiff_stack::page(&mut pages, 0, limits)?, false));
+        return tiff_stack::page(&mut pages, 0, limits);
     }
-    let formats = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Bmp];
-    let image = decode(bytes, &formats, limits)?;
-    let has_alpha = image.color().has_alpha();
-    let picture = match image {
-        image if alpha_as_gray => Picture::Gray(alpha_of(image)),
-        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
-            Picture::Gray(image.into_luma8())
-        }
-        DynamicImage::ImageLuma16(_) | DynamicImage::ImageLumaA16(_) => {
-            Picture::Gray16(image.into_luma16())
-        }
-        _ => Picture::Rgb(image.into_rgb8()),
-    };
-    Ok((picture, has_alpha))
-}
-
-/// Returns the alpha of a picture as gray.
-fn alpha_of(image: DynamicImage) -> GrayImage {
-    let rgba = image.into_rgba8();
-    GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| {
-        Luma([rgba.get_pixel(x, y).0[3]])
-    })
+    let formats = [
+        ImageFormat::Png,
+        ImageFormat::Jpeg,
+        ImageFormat::Bmp,
+        ImageFormat::WebP,
+    ];
+    decode_any(bytes, &formats, limits)
 }
 
 fn bytes_of(from: impl Read, limits: &Limits) -> Result<Vec<u8>, Error> {

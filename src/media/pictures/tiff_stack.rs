@@ -2,12 +2,12 @@
 
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
 
-use image::ImageBuffer;
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageBuffer};
 use tiff::decoder::{Decoder, DecodingResult, Limits as TiffLimits};
 use tiff::tags::Tag;
 use tiff::{ColorType, TiffError};
 
-use super::picture::Picture;
 use crate::media::error::Error;
 use crate::media::limits::Limits;
 
@@ -82,12 +82,13 @@ fn number(file: &mut impl Read, n_bytes: usize, is_big_endian: bool) -> Result<u
     Ok(u64::from_le_bytes(bytes))
 }
 
-/// Decodes a page, counted from 0. Fails for samples other than gray or RGB of 8 or 16 bits.
+/// Decodes a page, counted from 0, and turns it as its tag Orientation says. Fails for samples other than gray or RGB
+/// of 8 or 16 bits.
 pub(super) fn page<R: Read + Seek>(
     pages: &mut Decoder<R>,
     idx: usize,
     limits: &Limits,
-) -> Result<Picture, Error> {
+) -> Result<DynamicImage, Error> {
     pages.seek_to_image(idx).map_err(from_tiff)?;
     let (width, height) = pages.dimensions().map_err(from_tiff)?;
     limits.check_size(width.into(), height.into())?;
@@ -101,28 +102,33 @@ pub(super) fn page<R: Read + Seek>(
     if is_planar && !matches!(color, ColorType::Gray(_)) {
         return Err(unsupported());
     }
+    // A tag that cannot be read says no orientation.
+    let orientation = pages.find_tag_unsigned::<u8>(Tag::Orientation);
+    let orientation = orientation.ok().flatten().and_then(Orientation::from_exif);
     let samples = pages.read_image().map_err(from_tiff)?;
-    let picture = match (color, samples) {
+    let image = match (color, samples) {
         (ColorType::Gray(8), DecodingResult::U8(gray)) => {
-            ImageBuffer::from_raw(width, height, gray).map(Picture::Gray)
+            ImageBuffer::from_raw(width, height, gray).map(DynamicImage::ImageLuma8)
         }
         (ColorType::Gray(16), DecodingResult::U16(gray)) => {
-            ImageBuffer::from_raw(width, height, gray).map(Picture::Gray16)
+            ImageBuffer::from_raw(width, height, gray).map(DynamicImage::ImageLuma16)
         }
         (ColorType::RGB(8), DecodingResult::U8(rgb)) => {
-            ImageBuffer::from_raw(width, height, rgb).map(Picture::Rgb)
+            ImageBuffer::from_raw(width, height, rgb).map(DynamicImage::ImageRgb8)
         }
         (ColorType::RGBA(8), DecodingResult::U8(rgba)) => {
             let rgb = rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]);
-            ImageBuffer::from_raw(width, height, rgb.collect()).map(Picture::Rgb)
+            ImageBuffer::from_raw(width, height, rgb.collect()).map(DynamicImage::ImageRgb8)
         }
         (ColorType::RGB(16), DecodingResult::U16(rgb)) => {
             let rgb = rgb.iter().map(|&level| (level >> 8) as u8);
-            ImageBuffer::from_raw(width, height, rgb.collect()).map(Picture::Rgb)
+            ImageBuffer::from_raw(width, height, rgb.collect()).map(DynamicImage::ImageRgb8)
         }
         _ => return Err(unsupported()),
     };
-    picture.ok_or_else(unsupported)
+    let mut image = image.ok_or_else(unsupported)?;
+    image.apply_orientation(orientation.unwrap_or(Orientation::NoTransforms));
+    Ok(image)
 }
 
 fn from_tiff(error: TiffError) -> Error {

@@ -6,6 +6,7 @@ use std::fs::File;
 use std::io;
 use std::os::unix::fs::FileExt;
 
+use super::animated_ending;
 use crate::media::container::Container;
 
 /// The end of a file in relation to its structure.
@@ -34,6 +35,15 @@ const TRAILING_BOXES: [&[u8; 4]; 13] = [
 const MAX_OGG_PAGE: u64 = 27 + 255 + 255 * 255;
 
 impl Ending {
+    /// Returns how a file ends whose pictures are `cut` or go on to its end.
+    fn of_data(cut: bool) -> Ending {
+        if cut {
+            Ending::InsideData
+        } else {
+            Ending::Whole
+        }
+    }
+
     /// Returns how `file` of `n_bytes` ends. Fails only if reading fails.
     pub(super) fn detect(container: Container, file: &File, n_bytes: u64) -> io::Result<Ending> {
         let bytes = Bytes { file, n_bytes };
@@ -44,6 +54,8 @@ impl Ending {
             Container::Asf => bytes.ending_of_asf(),
             Container::Flv => bytes.ending_of_flv(),
             Container::Ogg => bytes.ending_of_ogg(),
+            Container::Gif => animated_ending::is_cut_gif(file).map(Ending::of_data),
+            Container::Apng => animated_ending::is_cut_apng(file).map(Ending::of_data),
             // A sequence of packets without an overall structure.
             Container::MpegTs | Container::MpegPs | Container::H264 | Container::Hevc => {
                 Ok(Ending::Whole)
@@ -352,6 +364,8 @@ mod tests {
             Container::Asf,
             Container::Flv,
             Container::Ogg,
+            Container::Gif,
+            Container::Apng,
         ] {
             for byte in [0x00, 0x01, 0x7f, 0x80, 0xff] {
                 ending(container, &[byte; 70_000]);

@@ -16,7 +16,7 @@ use crate::media::tools::{Tool, installed};
 use flockreel_core::raster::{ColorSpec, Matrix, Range};
 
 /// Accepted codecs, by ffprobe's names.
-const CODECS: [&str; 21] = [
+const CODECS: [&str; 23] = [
     "h264",
     "hevc",
     "vp8",
@@ -38,11 +38,13 @@ const CODECS: [&str; 21] = [
     "theora",
     "flv1",
     "h263", // the codec of many .3gp files
+    "gif",
+    "apng",
 ];
 
 /// The entries requested from ffprobe.
 const HEADER_ENTRIES: &str = "stream=index,codec_name,codec_type,codec_tag_string,\
-    width,height,pix_fmt,sample_aspect_ratio,r_frame_rate,avg_frame_rate,time_base,color_range,color_space,\
+    width,height,pix_fmt,sample_aspect_ratio,r_frame_rate,avg_frame_rate,time_base,color_range,color_space,color_transfer,\
     field_order:stream_disposition=attached_pic:stream_tags=enc_key_id,alpha_mode:stream_side_data=displaymatrix";
 
 /// Maximum length of ffprobe's header output, bytes. Free choice.
@@ -217,6 +219,15 @@ pub(super) fn color_of(stream: &Value) -> ColorSpec {
         || (text(&stream["color_range"]) == "pc" && !is_rgb(pix_fmt));
     let range = if full { Range::Full } else { Range::Limited };
     ColorSpec { matrix, range }
+}
+
+/// Returns the standard of a film of high dynamic range; `None` for other films.
+pub(super) fn hdr_transfer(stream: &Value) -> Option<&'static str> {
+    match text(&stream["color_transfer"]) {
+        "smpte2084" => Some("PQ"),
+        "arib-std-b67" => Some("HLG"),
+        _ => None,
+    }
 }
 
 /// Returns the bits of a gray pixel format, by ffmpeg's name, if they are more than 8.

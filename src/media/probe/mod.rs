@@ -4,6 +4,7 @@
 //! Two runs of ffprobe read the headers and the timestamps of all video packets. A third run decodes the
 //! film, if the packets do not determine its pictures. Numbers in the header are treated as claims.
 
+mod animated_ending; // detection of cut GIF and APNG files
 mod ending; // detection of files that are cut off
 pub(in crate::media) mod header; // stream headers
 mod mov_index; // check of the index of an MP4 file
@@ -151,6 +152,9 @@ fn judge(
     if !limits.allow_truncated {
         notices.extend(file.notice(n_pictures));
     }
+    let has_plain_times = times.has_plain_times && notices.is_empty();
+    let hdr = header::hdr_transfer(stream);
+    notices.extend(hdr.map(|transfer| Notice::HighDynamicRange { transfer }));
     Ok(Probe {
         container: file.container,
         stream_idx: index_of(stream),
@@ -169,7 +173,7 @@ fn judge(
         has_alpha: has_alpha(stream),
         interlaced: is_interlaced(stream),
         n_pictures,
-        has_plain_times: times.has_plain_times && notices.is_empty(),
+        has_plain_times,
         timeline,
         notices,
     })

@@ -179,6 +179,29 @@ impl Timeline {
         }
     }
 
+    /// Returns the picture that an output frame shows, and its time in seconds from the first. Returns `None` after the
+    /// last frame of a variable rate; at a constant rate each picture is a frame, without an end.
+    pub(in crate::media) fn picture_at(
+        &self,
+        frame_idx: usize,
+        n_pictures: usize,
+    ) -> Option<(usize, f64)> {
+        match self {
+            Timeline::Constant { fps, late_s } => {
+                let late = (frame_idx + late_s.len()).checked_sub(n_pictures);
+                let late_s = late.and_then(|k| late_s.get(k));
+                let time_s = late_s.copied().unwrap_or(frame_idx as f64 / fps);
+                Some((frame_idx, time_s))
+            }
+            Timeline::Variable {
+                times_s, sources, ..
+            } => {
+                let picture_idx = *sources.get(frame_idx)? as usize;
+                Some((picture_idx, *times_s.get(picture_idx)?))
+            }
+        }
+    }
+
     /// Returns the frame rate of the output, frames per second.
     pub(in crate::media) fn fps(&self) -> f64 {
         match self {

@@ -8,7 +8,7 @@ import { say } from "../app/words.js";
 import { openTray } from "./tray-button.js";
 
 /** Endings of files that the service may be able to read; the choice of files begins with these. */
-const ACCEPT = "video/*,.mkv,.avi,.mov,.ts,.mts,.m2ts,.mpg,.vob,.wmv,.asf,.flv,.ogv,.3gp,.h264,.hevc,.zip,.tif,.tiff";
+const ACCEPT = "video/*,.mkv,.avi,.mov,.ts,.mts,.m2ts,.mpg,.vob,.wmv,.asf,.flv,.ogv,.3gp,.h264,.hevc,.gif,.png,.apng,.webp,.zip,.tif,.tiff";
 
 /** Accepts films that are dropped on the page. */
 export function startDrop() {

@@ -142,13 +142,13 @@ impl Corpus<'_> {
             ),
             ("-c:v utvideo", "ut.avi", Code::CodecNotAllowed),
             ("-update 1", "still.tiff", Code::TooFewFrames),
-            ("-c:v gif", "film.gif", Code::NotAVideo),
-            ("-c:v libwebp -loop 0", "film.webp", Code::NotAVideo),
         ] {
             let film = self.film(10, &format!("{args} {name}"));
             self.refused(film, &[code]);
         }
-        for name in ["still.png", "still.jpg", "still.bmp"] {
+        let still = self.film(1, "still.gif");
+        self.refused(still, &[Code::TooFewFrames]);
+        for name in ["still.png", "still.jpg", "still.bmp", "still.webp"] {
             let film = self.film(1, name);
             self.refused(film, &[Code::NotAVideo]);
         }

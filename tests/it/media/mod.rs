@@ -3,6 +3,7 @@
 
 mod advice;
 mod alpha;
+mod animated;
 pub(crate) mod bad;
 pub(crate) mod corpus;
 mod good;
@@ -13,6 +14,7 @@ mod kinds;
 mod pictures;
 mod real;
 pub(crate) mod sandbox;
+mod shown;
 mod speed;
 mod traced;
 mod written;
