@@ -105,19 +105,9 @@ pub fn plan_flock(
     params: &Params,
     progress: &dyn Progress,
 ) -> Result<Flock, Error> {
-    params.check().map_err(Error::InvalidParams)?;
-    if library.stats.animal_too_small {
-        return Err(Error::AnimalTooSmall);
-    }
-    if library.playback.component.is_empty() || library.playback.jumps.is_empty() {
-        return Err(Error::NoTransitions);
-    }
+    refuse(library, params)?;
     let (mut params, support) = resolved(params, library);
     let lens = Lens::new(library, &params);
-    let is_film = params.position == Position::Film;
-    if is_film && params.count != Some(1) && stays_in_place(library, lens.length_px) {
-        return Err(Error::StaysInPlace);
-    }
     let motion = motion_of(library, &lens);
     let tank = Tank::from_library(library, &lens, &motion, &params);
     let stands = (support.iter()).map(|support| support.capacity(CLEAR_BL * lens.length_px));
@@ -171,8 +161,25 @@ pub fn plan_flock(
     })
 }
 
+/// Fails if no flock can be made of a library.
+fn refuse(library: &Library, params: &Params) -> Result<(), Error> {
+    params.check().map_err(Error::InvalidParams)?;
+    if library.stats.animal_too_small {
+        return Err(Error::AnimalTooSmall);
+    }
+    if library.playback.component.is_empty() || library.playback.jumps.is_empty() {
+        return Err(Error::NoTransitions);
+    }
+    let shows_places = params.position == Position::Film && !params.is_loop;
+    if shows_places && params.count != Some(1) && stays_in_place(library) {
+        return Err(Error::StaysInPlace);
+    }
+    Ok(())
+}
+
 /// Returns whether the animal was nearly always at one place.
-fn stays_in_place(library: &Library, length_px: f64) -> bool {
+fn stays_in_place(library: &Library) -> bool {
+    let length_px = library.stats.length_px.unwrap_or(0.0);
     let places: Vec<[f64; 2]> = library.places_px().collect();
     let middle = [0, 1].map(|k| median(places.iter().map(|place| place[k])).unwrap_or_default());
     let is_near = |[x, y]: &&[f64; 2]| (x - middle[0]).hypot(y - middle[1]) < STAYS_BL * length_px;
