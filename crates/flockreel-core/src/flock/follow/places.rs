@@ -8,12 +8,13 @@ use super::support::Support;
 use crate::flock::boids::vector::dot;
 use crate::flock::lens::Lens;
 use crate::flock::placement::Placer;
-use crate::library::Library;
+use crate::library::{Library, View};
 
 /// Distance below which another animal is too near, body lengths. Free choice.
 pub(in crate::flock) const CLEAR_BL: f64 = 0.9;
-/// Cost of a frame at the same place as another animal, radians. Free choice.
-const COST_OF_OVERLAP: f64 = 3.0;
+/// Cost of a frame at the same place as another animal, from the side, where one may be behind the other, and from
+/// above, radians. Free choices.
+const COSTS_OF_OVERLAP: [f64; 2] = [1.0, 3.0];
 /// Distance from the boid that costs nothing, body lengths, and cost of a frame for each body length beyond,
 /// radians. Free choices.
 const SLACK_BL: f64 = 1.0;
@@ -169,7 +170,8 @@ impl World<'_> {
             Some(home) => COST_AWAY * distance_bl(home) + COST_OF_AIR * self.in_air(place),
             None => COST_OF_GAP * (distance_bl(around.goal_px) - SLACK_BL).max(0.0),
         };
-        own + COST_OF_OVERLAP * overlaps.sum::<f64>()
+        let is_top = self.placer.library.poses.view == View::Top;
+        own + COSTS_OF_OVERLAP[usize::from(is_top)] * overlaps.sum::<f64>()
             + COST_BEYOND * beyond_bl.max(0.0)
             + self.home_range.cost(place.centroid_px)
     }
@@ -241,7 +243,6 @@ mod tests {
     use super::*;
     use crate::flock::Params;
     use crate::flock::synthetic;
-    use crate::library::View;
 
     #[test]
     fn the_home_range_costs_least_where_the_animal_was() {
