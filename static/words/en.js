@@ -223,6 +223,7 @@ export default {
   "reel.strips": "Order of the flock over time", "reel.strip.polarization": "Agreement of headings", "reel.strip.milling": "Circling", "reel.strip.nearest_neighbor_bl": "Distance in space to the nearest neighbor (body lengths)",
   "reel.strip.polarization.help": "Polarization: 1 if all head the same way, 0 if their headings cancel out.", "reel.strip.milling.help": "Milling: 1 if all circle around the middle, 0 if none does.", "reel.strip.nearest_neighbor_bl.help": "Distance to the nearest other animal, a mean over all.",
   "reel.strip.means": "0 to {most}, mean {mean}", "reel.strip.now": "in this frame {value}",
+  "reel.advice.no_school": "Each animal goes its own way, as one does that stands, walks or is filmed from above. Choose the behavior “One way” for a school.",
   "reel.advice.short_loop": "The loop is too short for the animals to return to where they started. Choose a longer one.",
   "reel.asked": "The plan: wanted and shown headings", "reel.asked.help": "The rules of the flock give each animal a wanted heading. Pieces of the film are joined so that the shown heading comes close to it.", "reel.asked.loading": "Loading the plan…",
   "reel.asked.label": "Heading of one animal over time: as the rules of the flock want it, and as the film shows it. Below are the pieces of film.", "reel.asked.choose": "Animal to look at", "reel.asked.animal": "Animal {id}", "reel.asked.boid": "wanted", "reel.asked.shown": "shown",

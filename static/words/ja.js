@@ -222,6 +222,7 @@ export default {
   "reel.strips": "群れの秩序の時間変化", "reel.strip.polarization": "向きのそろい方", "reel.strip.milling": "旋回の強さ", "reel.strip.nearest_neighbor_bl": "最も近い個体までの空間内の距離（体長）",
   "reel.strip.polarization.help": "整列度です。全個体が同じ向きなら1、向きが打ち消し合うと0になります。", "reel.strip.milling.help": "旋回度です。全個体が中心の周りを旋回すると1、どの個体も旋回しないと0になります。", "reel.strip.nearest_neighbor_bl.help": "最も近い個体までの距離を、全個体で平均した値です。",
   "reel.strip.means": "範囲 0〜{most}、平均 {mean}", "reel.strip.now": "このフレームでは{value}",
+  "reel.advice.no_school": "立つ・歩く動物や、上から撮影した動物は、それぞれ自由に動きます。群れで泳がせるには、群行動で「同じ向き」を選んでください。",
   "reel.advice.short_loop": "ループが短すぎるため、各個体が最初の位置に戻れません。もっと長くしてください。",
   "reel.asked": "計画：目標と表示", "reel.asked.help": "群れのルールは、各個体の方向の目標を決めます。表示する方向が目標に近くなるように、動画の区間をつなぎ合わせています。", "reel.asked.loading": "計画を読み込んでいます…",
   "reel.asked.label": "1個体の方向の時間変化です。群れのルールが決めた目標と、動画に表示する方向を示します。下に動画の区間を並べています。", "reel.asked.choose": "表示する個体", "reel.asked.animal": "個体{id}", "reel.asked.boid": "目標", "reel.asked.shown": "表示",

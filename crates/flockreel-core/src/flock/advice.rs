@@ -1,6 +1,8 @@
-//! Advice on a finished flock: too many animals for the tank, or a loop that is too short.
+//! Advice on a finished flock: too many animals for the tank, a loop that is too short, or animals that keep no
+//! company.
 
 use super::Flock;
+use super::params::Rules;
 
 /// 90th percentile of the heading error above which a loop counts as too short, radians. Free choice.
 const SHORT_LOOP_RAD: f64 = 0.35;
@@ -19,6 +21,12 @@ pub enum Advice {
         /// Number of individuals.
         count: usize,
     },
+    /// The animals do not school.
+    #[error(
+        "each animal goes its own way, as one does that stands, walks or is filmed from above: set `rules.sociality` to \
+         1 (or choose the preset `school`) for a school"
+    )]
+    NoSchool,
     /// The loop is too short for the animals to return to where they started.
     #[error(
         "the loop of {length_s:.1} s is too short for the animals to return to their start: in a tenth of the frames \
@@ -44,7 +52,15 @@ impl Advice {
             length_s: f64::from(flock.params.frames) / flock.fps,
             off_deg: error_rad.to_degrees(),
         });
-        little_room.into_iter().chain(short_loop).collect()
+        // Who chose other rules knows.
+        let alone = Rules {
+            sociality: Some(0.0),
+            ..Rules::default()
+        };
+        let goes_alone = count > 1 && flock.params.rules == alone;
+        let no_school = goes_alone.then_some(Advice::NoSchool);
+        let all = [little_room, short_loop, no_school];
+        all.into_iter().flatten().collect()
     }
 
     /// Returns the stable code.
@@ -52,6 +68,7 @@ impl Advice {
         match self {
             Advice::LittleRoom { .. } => "little_room",
             Advice::ShortLoop { .. } => "short_loop",
+            Advice::NoSchool => "no_school",
         }
     }
 }
@@ -74,14 +91,21 @@ mod tests {
         };
         let mut flock = plan_flock(&library, &params, &Silent).expect("a good library");
         flock.stats.room_for = 2;
+        flock.params.rules.sociality = Some(0.0);
         flock.stats.heading_error_p90_rad = 1.0;
         let advice: Vec<_> = Advice::all(&flock)
             .iter()
             .map(|a| (a.code(), a.to_string()))
             .collect();
-        let [("little_room", room), ("short_loop", short)] = &advice[..] else {
+        let [
+            ("little_room", room),
+            ("short_loop", short),
+            ("no_school", alone),
+        ] = &advice[..]
+        else {
             panic!("{advice:?}");
         };
+        assert!(alone.contains("goes its own way"), "{alone}");
         assert!(room.contains("room for about 2 of the 3 animals"), "{room}");
         assert!(
             short.contains("loop of 1.3 s") && short.contains(" 57 degrees"),
@@ -89,6 +113,7 @@ mod tests {
         );
         flock.stats.room_for = 3;
         flock.params.is_loop = false;
+        flock.params.rules.sociality = Some(1.0);
         assert!(Advice::all(&flock).is_empty());
     }
 }
