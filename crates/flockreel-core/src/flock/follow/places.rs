@@ -14,7 +14,7 @@ use crate::library::{Library, View};
 pub(in crate::flock) const CLEAR_BL: f64 = 0.9;
 /// Cost of a frame at the same place as another animal, from the side, where one may be behind the other, and from
 /// above, radians. Free choices.
-const COSTS_OF_OVERLAP: [f64; 2] = [1.0, 3.0];
+const COSTS_OF_OVERLAP: [f64; 2] = [1.0, 2.0];
 /// Distance from the boid that costs nothing, body lengths, and cost of a frame for each body length beyond,
 /// radians. Free choices.
 const SLACK_BL: f64 = 1.0;
