@@ -37,7 +37,7 @@ const CELL_BL: f64 = 0.25;
 const KERNEL_BL: f64 = 0.4;
 /// Cost of a frame at a place where the animal was e times more seldom than at its favorite place, radians.
 /// Free choice.
-const COST_OF_RARITY: f64 = 0.25;
+const COST_OF_RARITY: f64 = 0.03;
 /// Least density of the home range, as a share of the greatest. Free choice.
 const MIN_DENSITY: f64 = 0.002;
 
