@@ -19,7 +19,7 @@ import subprocess
 import sys
 
 # Individuals, frames, runs, further arguments, and the time limit with all threads in seconds.
-CASES = [(20, 400, 30, [], 0.030), (1000, 1000, 1, [], 3.0), (1000, 1000, 1, ["--one-side"], 3.0),
+CASES = [(20, 400, 30, [], 0.060), (1000, 1000, 1, [], 4.0), (1000, 1000, 1, ["--one-side"], 4.0),
          (20, 400, 1, ["--of=50000"], None)]
 
 

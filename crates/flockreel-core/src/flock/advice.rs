@@ -52,7 +52,7 @@ impl Advice {
             length_s: f64::from(flock.params.frames) / flock.fps,
             off_deg: error_rad.to_degrees(),
         });
-        // Who chose other rules knows.
+        // Other rules were chosen by the user, who needs no advice on them.
         let alone = Rules {
             sociality: Some(0.0),
             ..Rules::default()

@@ -22,9 +22,9 @@ const MAX_HALF_LOG_ODDS: f64 = 4.0;
 const MIN_SPREAD: f64 = 0.25;
 /// Greatest speed that counts, body lengths per second. Free choice.
 const MAX_SPEED_BL_S: f64 = 1.0;
-/// Length of the spans over which speeds are averaged, seconds. Their scatter gives the certainty. Free
-/// choice.
-const SPAN_S: f64 = 0.5;
+/// Length of the spans that count as independent, seconds. Speeds are averaged over them, and their scatter gives
+/// the certainty. Free choice: frames nearer to each other show the same stroke and the same posture.
+pub(super) const SPAN_S: f64 = 0.5;
 
 /// Speed with which an animal that stays at its place sways to and fro, body lengths per second. Free choice.
 const SWAY_BL_S: f64 = 0.05;
@@ -222,6 +222,14 @@ mod tests {
         assert!(ends.tempered(0.99) > 0.9);
         let backs_off_at_times = evidence_of(|k| if k % 60 < 15 { -0.4 } else { 0.5 });
         assert_eq!(n_wrong(&backs_off_at_times), 0);
+    }
+
+    #[test]
+    fn an_animal_that_hardly_leaves_its_place_leaves_the_head_uncertain() {
+        let drifts = evidence_of(|_| 0.01).tempered(0.99);
+        assert!((0.4..0.65).contains(&drifts), "{drifts}");
+        let walks = evidence_of(|_| 0.2).tempered(0.99);
+        assert!(walks > 0.9, "{walks}");
     }
 
     #[test]

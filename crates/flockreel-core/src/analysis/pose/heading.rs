@@ -7,14 +7,12 @@
 //! that one early error lasts forever. See docs/explanation/algorithms.md, "Pose".
 
 use super::Axes;
+use super::appearance::SPAN_S;
 
 /// Speed along the axis that counts as evidence 1, body lengths per second. Free choice.
 const UNIT_SPEED_BL_S: f64 = 0.45;
 /// Greatest evidence from motion, half the log-odds. Free choice.
 const MAX_MOTION_EVIDENCE: f64 = 3.0;
-/// Time after which motion and look of the ends count as new evidence, seconds. Free choice: successive frames show
-/// the same stroke and the same posture.
-const INDEPENDENT_S: f64 = 0.5;
 /// Evidence where the user gave the head; it exceeds all other evidence.
 const GIVEN_HEAD_EVIDENCE: f64 = 1e6;
 
@@ -54,7 +52,7 @@ pub(super) fn decode(
     given_head: Option<GivenHead>,
     fps: f64,
 ) -> Vec<Option<Head>> {
-    let share = (1.0 / (INDEPENDENT_S * fps)).min(1.0);
+    let share = (1.0 / (SPAN_S * fps)).min(1.0);
     let evidence = |k: usize| {
         axes[k].as_ref()?.axis_rad?;
         let speed = speed_along[k].unwrap_or(0.0);

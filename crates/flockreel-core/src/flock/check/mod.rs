@@ -3,8 +3,8 @@
 //! Every step must be the next frame or a jump of the library, after the dwell. The total cost must be right,
 //! and no cheaper plan may exist. Plans with `position: film` also weigh places, whose costs are not in the
 //! file. Only their steps and costs are checked; in files up to schema 2 they must be the cheapest too. Whole
-//! films, segments and loops are checked in every view, but not with `matching.by: direction`. The division of a total into its parts is not checked,
-//! only their sum.
+//! films, segments and loops are checked in every view, but not with `matching.by: direction`. The division of a
+//! total into its parts is not checked, only their sum.
 //!
 //! `costs` and `optimum` use no code of `flock::plan`. The motion of the filmed animal and the limits of
 //! segments are not computed again: `motion`, `lens` and `follow::segments` are read here too.

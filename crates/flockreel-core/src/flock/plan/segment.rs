@@ -1,8 +1,9 @@
-//! Surroundings of a segment: the frames shown before it, and the future cost of its last state.
+//! Playback across segments (`flock::follow`): the frames shown before a segment, and the future cost of its last
+//! state.
 //!
 //! A plan continues from the state shown last, which may have to play on before the next jump. Its last
 //! state adds a future cost F(s) = min over successors s' of (cost of the jump + 0.995 F(s')) (Schoedl et
-//! al., Video Textures, 2000). The plan of a segment is exact with these costs.
+//! al., Video Textures, 2000).
 
 use super::trellis::Trellis;
 

@@ -102,15 +102,9 @@ impl Trellis {
     /// Returns each target with the jumps to it: (source state, cost in turns).
     #[inline]
     pub fn jumps(&self) -> impl Iterator<Item = (u32, &[(u32, u32)])> {
-        let mut first = 0;
-        self.targets
-            .iter()
-            .zip(&self.first_source[1..])
-            .map(move |(&target, &end)| {
-                let jumps = &self.sources[first..end as usize];
-                first = end as usize;
-                (target, jumps)
-            })
+        let ranges = self.first_source.windows(2);
+        let jumps = ranges.map(|ends| &self.sources[ends[0] as usize..ends[1] as usize]);
+        self.targets.iter().copied().zip(jumps)
     }
 
     /// Returns the cost of the jump from a state to another, in turns; 0 if there is none.
