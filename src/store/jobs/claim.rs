@@ -37,6 +37,8 @@ impl Store {
     /// job started longer ago. Among the jobs of one owner small films go first, since a person waits for them,
     /// then small measurements, then the others; older ones before later ones. Every second start goes to the
     /// oldest job, if that is late, so that no job waits for ever.
+    ///
+    /// The counts of the owners are materialized, or SQLite would take them again for each queued job.
     pub async fn claim_in(
         &self,
         lane: Lane,
@@ -45,7 +47,7 @@ impl Store {
         lease_ms: i64,
     ) -> Result<Option<Lease>, Error> {
         let lease: Option<Lease> = sql::query(
-            "with turns (owner, n_running, last_ms, n_started) as ( \
+            "with turns (owner, n_running, last_ms, n_started) as materialized ( \
                  select owner, (select count(*) from jobs r \
                                 where r.owner = q.owner and r.state = 'running'), \
                         (select max(started_ms) from jobs s where s.owner = q.owner), \
