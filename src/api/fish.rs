@@ -226,8 +226,8 @@ impl View for FishView {
 impl ResultView for FishView {
     const FILES: Files = FILES;
 
-    fn folder(row: &FilmRow) -> &str {
-        &row.folder
+    fn folders(row: &FilmRow) -> Vec<&str> {
+        vec![&row.folder]
     }
 
     fn with_files(self, files: Vec<FileView>) -> FishView {

@@ -165,6 +165,7 @@ impl IntoResponse for Problem {
             self.code,
             Code::Stopping
                 | Code::NotReady
+                | Code::Making
                 | Code::StorageFull
                 | Code::RequestInProgress
                 | Code::QuotaExceeded
@@ -238,6 +239,7 @@ pub(super) fn status_of(code: Code) -> StatusCode {
         Code::AlreadyFinished
         | Code::AlreadyStored
         | Code::RetryRefused
+        | Code::Making
         | Code::RequestInProgress
         | Code::OffsetDiffers => StatusCode::CONFLICT,
         Code::Unauthenticated => StatusCode::UNAUTHORIZED,

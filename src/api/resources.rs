@@ -38,8 +38,8 @@ pub(super) trait ResultView: View {
     /// Files that can be downloaded.
     const FILES: Files;
 
-    /// Returns the folder of the files.
-    fn folder(row: &<Self::Stored as Resource>::Row) -> &str;
+    /// Returns the folders of the files.
+    fn folders(row: &<Self::Stored as Resource>::Row) -> Vec<&str>;
 
     /// Returns the view with its files.
     fn with_files(self, files: Vec<FileView>) -> Self;
@@ -145,7 +145,10 @@ impl Access {
     pub(super) async fn get_result<V: ResultView>(&self, id: Uuid) -> JsonAnswer<V> {
         let row = self.find::<V::Stored>(id).await?;
         self.note_use::<V::Stored>(&row);
-        let stored = self.store().files_of(V::folder(&row)).await?;
+        let mut stored = Vec::new();
+        for folder in V::folders(&row) {
+            stored.extend(self.store().files_of(folder).await?);
+        }
         let files = stored.into_iter().filter_map(|file| {
             let BlobFile {
                 name, size_bytes, ..

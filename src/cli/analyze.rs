@@ -11,7 +11,7 @@ use sha2::{Digest, Sha256};
 use super::{Error, Listener, Summary, set};
 use crate::jobs::analysis::{Advice, read_options};
 use crate::jobs::masks::Masks;
-use crate::jobs::{overlay, refusal};
+use crate::jobs::{refusal, views};
 use crate::media::{self, Limits, Tool, Video, read_image};
 use flockreel_core::analysis::{self, Params};
 use flockreel_core::cpu;
@@ -124,7 +124,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     write_views(&args.output, &library)?;
     if let Some(path) = &args.overlay {
         let part = Part::new(source, params.from_s, params.to_s);
-        overlay::film(&part, &library.poses, path, &progress)?;
+        views::write_overlay(&part, &library.poses, path, &progress)?;
     }
     super::say(&view_sentence(&library.poses));
     let advice = Advice::for_library(&library, &params, video.notices());

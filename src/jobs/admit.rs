@@ -10,7 +10,8 @@ use uuid::Uuid;
 use super::attempt::Film;
 use super::clock::now_ms;
 use super::masks::Masks;
-use super::{Context, Error, attempt, overlay};
+use super::views::poster;
+use super::{Context, Error, attempt};
 use crate::media::{Limits, ReadOptions, Video, read_image};
 use crate::store::footage::{Added, BACKGROUND, Footage, MASKS, POSTER, VIDEO};
 use crate::store::owners::Owner;
@@ -44,9 +45,9 @@ pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, 
     let format = attempt::inspect(context, &received.draft).await?;
     drop(permit);
     let store = context.store.clone();
-    let (received, poster) = tokio::task::spawn_blocking(move || {
-        let poster = sealed_poster(&store, &received.draft)?;
-        Ok::<_, Error>((received, poster))
+    let (received, sealed) = tokio::task::spawn_blocking(move || {
+        let sealed = sealed_poster(&store, &received.draft)?;
+        Ok::<_, Error>((received, sealed))
     })
     .await
     .unwrap_or(Err(Error::Panicked))?;
@@ -54,7 +55,7 @@ pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, 
     let mut files = vec![received.video];
     files.extend(received.background);
     files.extend(received.masks);
-    files.extend(poster);
+    files.extend(sealed);
     footage.size_bytes = files.iter().map(|file| file.size_bytes).sum();
     let store = &context.store;
     let upload = received.counted.upload();
@@ -67,7 +68,7 @@ pub async fn admit(context: &Context, received: ReceivedFiles) -> Result<Added, 
 pub(super) fn inspect(folder: &Path) -> Result<Film, Error> {
     // A sender does not wait long for the poster.
     let limits = Limits {
-        stall_time: overlay::MAX_POSTER_TIME,
+        stall_time: poster::MAX_POSTER_TIME,
         ..Limits::default()
     };
     let path = folder.join(VIDEO);
@@ -89,7 +90,7 @@ pub(super) fn inspect(folder: &Path) -> Result<Film, Error> {
         }
     }
     // Footage that cannot be decoded has no poster: the analysis tells the reason.
-    if let Err(error) = overlay::write_poster(&video, folder) {
+    if let Err(error) = poster::write_poster(&video, folder) {
         tracing::info!(%error, "a footage has no poster");
         fs::remove_file(folder.join(POSTER)).ok();
     }

@@ -22,10 +22,10 @@ pub mod concurrency; // limits of simultaneous work
 pub mod fish; // library -> virtual fish
 pub mod flock; // library -> flock
 pub mod masks; // footage -> given masks or alpha channel
-pub mod overlay; // footage -> video with its poses drawn over it
 pub mod refusal; // refused footage -> picture of the reason
 pub mod sample; // nothing -> sample footage
 pub mod synchronous; // library -> computations during a request
+pub mod views; // library and its footage -> videos
 
 pub mod clock;
 pub mod error;
@@ -255,6 +255,7 @@ fn run(kind: Kind, input: &str, attempt: &Attempt) -> Result<Product, Error> {
     match kind {
         Kind::Sample => parse::<sample::Input>(input)?.run(attempt),
         Kind::Analysis => parse::<analysis::Input>(input)?.run(attempt),
+        Kind::Views => parse::<views::Input>(input)?.run(attempt),
         Kind::Flock => parse::<flock::Input>(input)?.run(attempt),
         Kind::Fish => parse::<fish::Input>(input)?.run(attempt),
     }
@@ -265,6 +266,7 @@ fn subject(kind: Kind, input: &str) -> Result<Option<Subject>, Error> {
     Ok(match kind {
         Kind::Sample => parse::<sample::Input>(input)?.subject(),
         Kind::Analysis => parse::<analysis::Input>(input)?.subject(),
+        Kind::Views => parse::<views::Input>(input)?.subject(),
         Kind::Flock => parse::<flock::Input>(input)?.subject(),
         Kind::Fish => parse::<fish::Input>(input)?.subject(),
     })
@@ -279,6 +281,7 @@ pub fn stages(kind: Kind) -> Stages {
     match kind {
         Kind::Sample => sample::STAGES,
         Kind::Analysis => analysis::STAGES,
+        Kind::Views => views::STAGES,
         Kind::Flock => flock::STAGES,
         Kind::Fish => fish::STAGES,
     }

@@ -6,9 +6,10 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::attempt::Film;
+use super::views::poster;
 use super::{
     Attempt, Context, Error, Extent, IdSequence, JobInput, Product, Stages, Subject, analysis,
-    flock, overlay,
+    flock,
 };
 use crate::media::VideoWriter;
 use crate::store;
@@ -93,7 +94,7 @@ impl JobInput for Input {
         let written = path.with_extension("mp4");
         write(&film, &written, attempt.reporter)?;
         std::fs::rename(&written, &path)?;
-        overlay::write_poster(&film, attempt.folder())?;
+        poster::write_poster(&film, attempt.folder())?;
         let format = film.format();
         Ok(Product {
             film: Some(Film {

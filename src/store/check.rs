@@ -127,6 +127,7 @@ const JOB_RULES: &[(&str, &str)] = &[
         "select j.id from jobs j where $1 is not null and (case when j.state = 'done' then 1 else 0 end) != ( \
          (select count(*) from footage r where r.job_id = j.id and r.fence = j.fence) \
          + (select count(*) from libraries r where r.job_id = j.id and r.fence = j.fence) \
+         + (select count(*) from views r where r.job_id = j.id and r.fence = j.fence) \
          + (select count(*) from flocks r where r.job_id = j.id and r.fence = j.fence) \
          + (select count(*) from fish r where r.job_id = j.id and r.fence = j.fence))",
     ),
@@ -140,6 +141,7 @@ const JOB_RULES: &[(&str, &str)] = &[
 const WRONG_SIZES: &str = "select r.folder from ( \
          select folder, size_bytes from footage union all \
          select folder, size_bytes from libraries union all \
+         select folder, size_bytes from views union all \
          select folder, size_bytes from flocks union all \
          select folder, size_bytes from fish) r \
          where r.size_bytes != ( \

@@ -40,7 +40,7 @@ impl Store {
             let folders = match kind {
                 ResourceKind::Footage => delete_footage_rows(&mut transaction, id).await?,
                 ResourceKind::Library => delete_library_rows(&mut transaction, id).await?,
-                ResourceKind::Flock | ResourceKind::Fish => {
+                ResourceKind::Flock | ResourceKind::Fish | ResourceKind::Views => {
                     delete_film_rows(&mut transaction, id).await?
                 }
             };
@@ -94,14 +94,16 @@ async fn delete_library_rows(
 ) -> Result<Vec<String>, sqlx::Error> {
     // Locks the jobs first, in the same order as finishing a job does. This prevents deadlocks.
     let jobs = "select 1 from jobs where result_id = $1 \
-               or kind in ('flock', 'fish') and json_extract(input, '$.library_id') = $2 for update";
+               or kind in ('views', 'flock', 'fish') and json_extract(input, '$.library_id') = $2 for update";
     let lock = sql::query(jobs).bind(library).bind(library.to_string());
     lock.execute(&mut *transaction).await?;
     let sql = "select folder from libraries where id = $1 union all \
+               select folder from views where library_id = $1 union all \
                select folder from flocks where library_id = $1 union all \
                select folder from fish where library_id = $1";
     let folders = folders_of(transaction, sql, library).await?;
     for sql in [
+        "delete from views where library_id = $1",
         "delete from flocks where library_id = $1",
         "delete from fish where library_id = $1",
         "delete from libraries where id = $1",
@@ -110,7 +112,7 @@ async fn delete_library_rows(
         delete.execute(&mut *transaction).await?;
     }
     let sql = "delete from jobs where result_id = $1 \
-               or kind in ('flock', 'fish') and json_extract(input, '$.library_id') = $2";
+               or kind in ('views', 'flock', 'fish') and json_extract(input, '$.library_id') = $2";
     let delete = sql::query(sql).bind(library).bind(library.to_string());
     delete.execute(&mut *transaction).await?;
     Ok(folders)

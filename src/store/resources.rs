@@ -7,6 +7,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::types::Uuid;
 
 use super::footage::Footage;
+use super::jobs::JobState;
 use super::owners::OwnerFilter;
 use super::{Error, Store, sql};
 
@@ -55,6 +56,8 @@ pub enum ResourceKind {
     Flock,
     /// The result of a fish job.
     Fish,
+    /// The videos of a library, the result of a views job. They have no address of their own.
+    Views,
 }
 
 /// A kind of resource as a type, for queries that return its rows.
@@ -103,7 +106,7 @@ pub struct Library {
     pub summary: String,
     /// Whether the footage is the sample made by the program.
     pub sample: bool,
-    /// Total size of the files, bytes.
+    /// Total size of the files, also of the views, bytes.
     pub size_bytes: i64,
     /// Whether it stays even if nobody uses it.
     pub pinned: bool,
@@ -113,6 +116,25 @@ pub struct Library {
     pub created_ms: i64,
     /// Scale, pixels per centimetre; `None` until somebody sets it.
     pub px_per_cm: Option<f64>,
+    /// The job that makes its views; `None` for a library of an older version, whose own folder has them.
+    pub views_job_id: Option<Uuid>,
+    /// State of that job.
+    pub views_state: Option<String>,
+    /// Folder of the views in the blob store; `None` unless that job is done.
+    pub views_folder: Option<String>,
+}
+
+impl Library {
+    /// Returns the state of the job that makes the views. The views of an older version are done.
+    pub fn views_state(&self) -> Result<JobState, Error> {
+        let state = self.views_state.clone().map(JobState::try_from);
+        Ok(state.transpose()?.unwrap_or(JobState::Done))
+    }
+
+    /// Returns the folder of the views. It has files only if the views are done.
+    pub fn views_folder(&self) -> &str {
+        self.views_folder.as_ref().unwrap_or(&self.folder)
+    }
 }
 
 impl Resource for Library {
@@ -191,11 +213,12 @@ pub struct FilmRow {
 
 impl ResourceKind {
     /// All kinds.
-    pub const ALL: [ResourceKind; 4] = [
+    pub const ALL: [ResourceKind; 5] = [
         ResourceKind::Footage,
         ResourceKind::Library,
         ResourceKind::Flock,
         ResourceKind::Fish,
+        ResourceKind::Views,
     ];
 
     /// Returns the name of the table, of the folder of the files, and of the routes.
@@ -205,6 +228,18 @@ impl ResourceKind {
             ResourceKind::Library => "libraries",
             ResourceKind::Flock => "flocks",
             ResourceKind::Fish => "fish",
+            ResourceKind::Views => "views",
+        }
+    }
+
+    /// Returns the SQL of the size of a row, with everything that is counted and deleted with it. The table has the
+    /// alias `r`.
+    pub(super) fn size(self) -> &'static str {
+        match self {
+            ResourceKind::Library => {
+                "r.size_bytes + coalesce((select v.size_bytes from views v where v.library_id = r.id), 0)"
+            }
+            _ => "r.size_bytes",
         }
     }
 
@@ -214,7 +249,9 @@ impl ResourceKind {
         let [footage_id, library_id, name] = match self {
             ResourceKind::Footage => ["r.id", "r.id", "r.name"],
             ResourceKind::Library => ["footage_id", "r.id", "f.name"],
-            ResourceKind::Flock | ResourceKind::Fish => ["footage_id", "library_id", "f.name"],
+            ResourceKind::Flock | ResourceKind::Fish | ResourceKind::Views => {
+                ["footage_id", "library_id", "f.name"]
+            }
         };
         format!(
             "and ($4 is null or {footage_id} = $4) and ($5 is null or {library_id} = $5) \
@@ -227,13 +264,15 @@ impl ResourceKind {
         let table = self.plural();
         match self {
             ResourceKind::Footage => "select * from footage r".to_owned(),
-            ResourceKind::Library => {
-                "select r.id, r.job_id, footage_id, r.folder, params, summary, f.name, sample, \
-                 r.size_bytes, r.pinned, r.used_ms, r.created_ms, r.px_per_cm \
-                 from libraries r join footage f on f.id = footage_id"
-                    .to_owned()
-            }
-            ResourceKind::Flock | ResourceKind::Fish => format!(
+            ResourceKind::Library => format!(
+                "select r.id, r.job_id, footage_id, r.folder, r.params, r.summary, f.name, sample, \
+                 {size} as size_bytes, r.pinned, r.used_ms, r.created_ms, r.px_per_cm, j.id as views_job_id, \
+                 j.state as views_state, (select v.folder from views v where v.library_id = r.id) as views_folder \
+                 from libraries r join footage f on f.id = footage_id \
+                 left join jobs j on j.after_job = r.job_id and j.kind = 'views'",
+                size = self.size()
+            ),
+            ResourceKind::Flock | ResourceKind::Fish | ResourceKind::Views => format!(
                 "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, f.name, sample, \
                  r.size_bytes, r.pinned, r.used_ms, r.created_ms \
                  from {table} r join libraries l on l.id = library_id \

@@ -74,7 +74,7 @@ pub struct Amount {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Usage {
     /// Stored resources by kind.
-    pub stored: [(ResourceKind, Amount); 4],
+    pub stored: [(ResourceKind, Amount); 5],
     /// Open resumable uploads, with their announced sizes.
     pub uploads: Amount,
     /// Announced size of the bodies of requests that are being received, bytes.

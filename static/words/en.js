@@ -18,7 +18,7 @@ export default {
 
   "tray.title": "Jobs", "tray.all": "All jobs", "tray.idle": "Jobs", "tray.busy": "{n} running", "tray.sending": "Sending {n}", "tray.refused": "{n} not accepted", "tray.paused": "{n} interrupted",
   "tray.empty": "Nothing is running.",
-  "job.analysis": "Measuring {film}", "job.flock": "Making a flock of {film}", "job.fish": "Making the virtual fish of {film}", "job.sample": "Filming a sample",
+  "job.analysis": "Measuring {film}", "job.views": "Making the videos of {film}", "job.flock": "Making a flock of {film}", "job.fish": "Making the virtual fish of {film}", "job.sample": "Filming a sample",
   "job.progress": "Progress", "job.left": "About {time} left.", "job.ahead": { one: "{n} job before this one.", other: "{n} jobs before this one." }, "job.restarted": "Restarted after an interruption (attempt {n}).", "job.open": "Open", "job.download": "Download", "job.again": "Measure again", "job.retry": "Try again", "job.film": "See the film",
   "upload.sending": "Sending", "upload.checking": "Checking", "upload.failed": "Not accepted", "upload.paused": "Interrupted", "upload.choose": "Choose the same file again. The upload continues where it stopped.", "upload.of": "{sent} of {total}",
   "state.queued": "Waiting", "state.running": "Working", "state.done": "Done", "state.failed": "Failed", "state.cancelled": "Cancelled", "state.cancelling": "Stopping",
@@ -40,6 +40,7 @@ export default {
   "home.step.flock": "Flock", "home.step.flock.help": "The frames of the one animal become as many animals as you like.",
   "home.looking": "Looking for flocks…", "home.waiting": "Your first flock is being made. It appears here as soon as it is ready.", "home.waiting.sample": "A virtual goldfish is being filmed, so that you can see a flock at once. It appears here as soon as it is ready.", "home.failed": "The film could not be measured. Its page gives the reason.", "home.empty": "No flock yet. Choose a film of one animal.",
   "home.film": "The film of the one animal", "home.open": "Open this flock", "home.play": "Play with it",
+  "views.making": "The film is being prepared. It plays here as soon as it is ready.", "views.failed": "The film could not be prepared. The list of jobs says why.", "views.making.short": "being made", "views.failed.short": "not made; see the list of jobs",
   "hero.one": "One animal, filmed for {time}", "hero.times": "× {n}", "hero.caption": { one: "The animal of the film “{film}”.", other: "All {n} are the same animal, from the film “{film}”." }, "hero.chase": "Chase them with the pointer or a finger.",
   "living.n": { one: "{n} animal", other: "{n} animals" }, "living.rest": "resting", "living.all_ways": "heading in different directions", "living.heading": "most heading {direction}", "living.groups": { one: "in one group", other: "in {n} groups" },
   "playing": "They react to the pointer. This motion is not part of the flock that was made.",

@@ -17,7 +17,7 @@ export default {
 
   "tray.title": "ジョブ", "tray.all": "すべてのジョブ", "tray.idle": "ジョブ", "tray.busy": "{n}件実行中", "tray.sending": "{n}件送信中", "tray.refused": "{n}件受付不可", "tray.paused": "{n}件中断",
   "tray.empty": "実行中のジョブはありません。",
-  "job.analysis": "{film}の計測", "job.flock": "{film}の群れの作成", "job.fish": "{film}のバーチャルフィッシュの作成", "job.sample": "サンプル動画の作成",
+  "job.analysis": "{film}の計測", "job.views": "{film}の動画の準備", "job.flock": "{film}の群れの作成", "job.fish": "{film}のバーチャルフィッシュの作成", "job.sample": "サンプル動画の作成",
   "job.progress": "進み具合", "job.left": "残り約{time}です。", "job.ahead": "このジョブより先に{n}件のジョブがあります。", "job.restarted": "中断したため、やり直しています（{n}回目の実行）。", "job.open": "開く", "job.download": "ダウンロード", "job.again": "再計測", "job.retry": "もう一度試す", "job.film": "動画を見る",
   "upload.sending": "送信中", "upload.checking": "確認中", "upload.failed": "受付不可", "upload.paused": "中断", "upload.choose": "同じファイルをもう一度選ぶと、中断したところから送信を再開します。", "upload.of": "{sent} / {total}",
   "state.queued": "待機中", "state.running": "実行中", "state.done": "完了", "state.failed": "失敗", "state.cancelled": "キャンセル済み", "state.cancelling": "キャンセル中",
@@ -39,6 +39,7 @@ export default {
   "home.step.flock": "群れ", "home.step.flock.help": "その動物のフレームから、好きな個体数の群れを作ります。",
   "home.looking": "群れを探しています…", "home.waiting": "最初の群れを作成しています。できあがると、ここに表示します。", "home.waiting.sample": "すぐに群れを見られるように、仮想の金魚を撮影しています。できあがると、ここに表示します。", "home.failed": "動画を計測できませんでした。動画のページで原因を確認できます。", "home.empty": "群れはまだありません。動物が1個体だけ映った動画を選んでください。",
   "home.film": "元になった1個体の動画", "home.open": "この群れを開く", "home.play": "スタジオで動かす",
+  "views.making": "動画を準備しています。準備ができしだい、ここで再生します。", "views.failed": "動画を準備できませんでした。理由はジョブの一覧にあります。", "views.making.short": "準備中", "views.failed.short": "作成できませんでした（ジョブの一覧を参照）",
   "hero.one": "撮影した1個体（{time}）", "hero.times": "× {n}個体", "hero.caption": "{n}個体はすべて、動画「{film}」に映った同じ1個体です。", "hero.chase": "ポインターや指で追いかけると逃げます。",
   "living.n": "{n}個体", "living.rest": "静止", "living.all_ways": "向きはばらばら", "living.heading": "多くは{direction}向き", "living.groups": "{n}グループ",
   "playing": "ポインターに反応している間だけの動きです。作成した群れの動きではありません。",

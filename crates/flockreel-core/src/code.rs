@@ -137,6 +137,9 @@ codes! {
         "Check the address. The object may have been deleted, or may belong to another owner."
     NotReady "not_ready" "The result does not exist yet: its job has not finished."
         "Wait for the job in `detail`, through its events or with `Prefer: wait=60`."
+    Making "making" "The file does not exist yet: a job is making it."
+        "Wait for the job in `detail`, through its events or with `Prefer: wait=60`, or repeat the request after the \
+         seconds of `Retry-After`."
     MethodNotAllowed "method_not_allowed" "The method is not allowed for this address."
         "The `Allow` header of the response lists the allowed methods."
     MalformedRequest "malformed_request" "The request is malformed."

@@ -279,8 +279,8 @@ impl View for FlockView {
 impl ResultView for FlockView {
     const FILES: Files = FILES;
 
-    fn folder(row: &FilmRow) -> &str {
-        &row.folder
+    fn folders(row: &FilmRow) -> Vec<&str> {
+        vec![&row.folder]
     }
 
     fn with_files(self, files: Vec<FileView>) -> FlockView {

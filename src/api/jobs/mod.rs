@@ -32,7 +32,8 @@ use flockreel_core::ids::{JobId, LibraryId};
 pub(super) struct JobView {
     #[schema(value_type = Uuid)]
     id: JobId,
-    /// `sample` (films the sample of an empty data folder), `analysis`, `flock` or `fish`.
+    /// `sample` (films the sample of an empty data folder), `analysis`, `views` (makes `film.mp4` and `overlay.mp4` of a
+    /// library, queued by the service), `flock` or `fish`.
     kind: &'static str,
     /// `queued`, `running`, `done`, `failed` or `cancelled`.
     state: &'static str,
@@ -194,18 +195,20 @@ pub(super) fn accepted(job: JobId, result: &str, body: impl Serialize) -> Respon
 /// failed or was cancelled, or `not_found` if no job makes it.
 pub(super) async fn absent_result(access: &Access, result: Uuid) -> Result<Problem, Problem> {
     let job = access.store().job_of_result(result, &access.caller.owners);
-    let Some(job) = job.await? else {
-        return Ok(Problem::not_found());
-    };
+    Ok((job.await?.as_ref()).map_or_else(Problem::not_found, absent_result_of))
+}
+
+/// Returns the problem for the absent result of a job, as [`absent_result`] does.
+pub(super) fn absent_result_of(job: &JobRow) -> Problem {
     let (state, id) = (job.state.name(), job.id);
     let sentence = format!("the job of this result is {state}: /v1/jobs/{id}");
-    Ok(match (job.state, job.failure()) {
+    match (job.state, job.failure()) {
         (JobState::Failed, Some(failure)) => {
             Problem::lost_result(failure.code, format!("{sentence}: {}", failure.detail), id)
         }
         (JobState::Cancelled, _) => Problem::lost_result(Code::Cancelled, sentence, id),
         _ => Problem::new(Code::NotReady, sentence),
-    })
+    }
 }
 
 /// Returns the analysis that must finish before a library can be used, or `None` if the library exists. Fails
@@ -237,8 +240,11 @@ pub(super) async fn job_to_follow(
     }
 }
 
-/// Returns the address of a job's result, which may not exist yet.
+/// Returns the address of a job's result, which may not exist yet. The views are files of their library.
 pub(super) fn result_path(row: &JobRow) -> String {
+    if let (Kind::Views, Some(library_id)) = (row.kind, row.subject_id()) {
+        return format!("/v1/libraries/{library_id}");
+    }
     format!("/v1/{}/{}", row.kind.result_kind().plural(), row.result_id)
 }
 
@@ -247,7 +253,7 @@ fn subject(row: &JobRow) -> Option<JobSubject> {
     let kind = match row.kind {
         Kind::Sample => return None,
         Kind::Analysis => "footage",
-        Kind::Flock | Kind::Fish => "library",
+        Kind::Views | Kind::Flock | Kind::Fish => "library",
     };
     row.subject_id().map(|id| JobSubject { kind, id })
 }

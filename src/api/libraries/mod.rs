@@ -1,6 +1,7 @@
 //! Libraries: the results of analyses, with their pictures and files.
 
 mod computed; // files that are not stored
+mod views; // files that are made late
 
 use axum::http::StatusCode;
 use serde::{Deserialize, Serialize};
@@ -16,11 +17,13 @@ use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::resources::{FileView, ResultView, View};
 use super::timestamp::rfc3339;
 use crate::jobs::analysis::Summary;
+use crate::jobs::views::{FILM, OVERLAY};
 use crate::store::jobs::JobState;
 use crate::store::resources::{Library, Property};
 use computed::{computed, is_computed, length_px, scale_of};
 use flockreel_core::code::Code;
 use flockreel_core::library::{Scale, ScaleError};
+use views::{ViewsState, folder_of};
 
 const FILES: Files = &[
     ("library.json", "application/json"),
@@ -28,7 +31,7 @@ const FILES: Files = &[
     ("poses.csv", "text/csv; charset=utf-8"),
     ("background.png", "image/png"),
     ("poster.jpg", "image/jpeg"),
-    ("film.mp4", "video/mp4"),
+    (FILM, "video/mp4"),
     ("atlas.json", "application/json"),
     ("atlas-0.webp", "image/webp"),
     ("atlas-1.webp", "image/webp"),
@@ -42,7 +45,7 @@ const FILES: Files = &[
     ("trajectory.svg", "image/svg+xml"),
     ("confidence.svg", "image/svg+xml"),
     ("transitions.svg", "image/svg+xml"),
-    ("overlay.mp4", "video/mp4"),
+    (OVERLAY, "video/mp4"),
     ("sprites.zip", "application/zip"),
     ("mattes.zip", "application/zip"),
 ];
@@ -69,7 +72,7 @@ pub(super) struct LibraryView {
     pinned: bool,
     /// Time of the last use, exact to the hour, RFC 3339 in UTC.
     used_at: String,
-    /// Size of all files, bytes.
+    /// Size of all files, bytes. It grows when the views are done.
     size_bytes: i64,
     /// Time of creation, RFC 3339 in UTC.
     created_at: String,
@@ -82,6 +85,8 @@ pub(super) struct LibraryView {
     px_per_cm: Option<f64>,
     /// Length of the animal, centimetres: `length_px` by the scale. Null without a scale.
     length_cm: Option<f64>,
+    /// State of `film.mp4` and `overlay.mp4`, which are made after the library.
+    views: ViewsState,
     /// Files that can be downloaded, by name. Only in the response for one library.
     #[serde(skip_serializing_if = "Option::is_none")]
     files: Option<Vec<FileView>>,
@@ -212,6 +217,10 @@ pub(super) async fn delete_library(access: Access, Id(id): Id) -> Result<StatusC
 /// - `sprites.zip`: the sprites, one PNG per frame
 /// - `mattes.zip`: the animal cut out of every frame as filmed, one PNG per frame
 ///
+/// `overlay.mp4` and `film.mp4` are made after the library by a job of kind `views`, when nothing else waits. Until then
+/// they fail with `making` (409, `Retry-After`), and with the code of that job (404) if it failed or was cancelled;
+/// `views` of the library names the job and its state.
+///
 /// Range and conditional requests are supported. Motion, summary and `distance.npy` are computed for each request
 /// and sent whole. They fail with `busy` if another computation does not end within 20 seconds, and
 /// `distance.npy` with `too_many_frames` for longer footage. The ETag of motion and summary depends on the scale.
@@ -238,7 +247,7 @@ pub(super) async fn get_library_file(
         access.note_use::<Library>(&library);
     }
     let download = Download {
-        folder: &library.folder,
+        folder: folder_of(&access, &library, name).await?,
         name,
         media_type,
         disposition: saved_as(media_type, &saved_name(&library, name)),
@@ -260,6 +269,7 @@ impl View for LibraryView {
 
     fn from_row(row: Library) -> Result<LibraryView, Problem> {
         let summary: Summary = super::stored(&row.summary)?;
+        let views = ViewsState::of(&row)?;
         let length_cm = scale_of(&row).zip(summary.length_px);
         Ok(LibraryView {
             px_per_cm: row.px_per_cm,
@@ -276,6 +286,7 @@ impl View for LibraryView {
             created_at: rfc3339(row.created_ms),
             params: super::stored(&row.params)?,
             summary,
+            views,
             files: None,
         })
     }
@@ -284,8 +295,9 @@ impl View for LibraryView {
 impl ResultView for LibraryView {
     const FILES: Files = FILES;
 
-    fn folder(row: &Library) -> &str {
-        &row.folder
+    fn folders(row: &Library) -> Vec<&str> {
+        let views = row.views_folder.as_deref();
+        [row.folder.as_str()].into_iter().chain(views).collect()
     }
 
     fn with_files(self, files: Vec<FileView>) -> LibraryView {

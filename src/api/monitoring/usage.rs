@@ -17,7 +17,7 @@ pub(in crate::api) struct UsageView {
     max_bytes: Option<u64>,
     /// Footage with its backgrounds, masks and posters.
     footage: AmountView,
-    /// Libraries.
+    /// Libraries with their views.
     libraries: AmountView,
     /// Flocks.
     flocks: AmountView,
@@ -59,7 +59,9 @@ pub(in crate::api) async fn get_usage(access: Access) -> JsonAnswer<UsageView> {
 impl UsageView {
     fn new(usage: Usage, retention: Retention) -> UsageView {
         let used_bytes = usage.used_bytes();
-        let [footage, libraries, flocks, fish] = usage.stored.map(|(_, amount)| amount.into());
+        let [footage, mut libraries, flocks, fish, views]: [AmountView; 5] =
+            usage.stored.map(|(_, amount)| amount.into());
+        libraries.size_bytes += views.size_bytes;
         let days = |n_days: u32| Some(n_days).filter(|n_days| *n_days > 0);
         UsageView {
             used_bytes,

@@ -9,7 +9,7 @@ use tokio::time::timeout;
 
 use super::Film;
 use super::message::End;
-use super::process::run_child;
+use super::process::{SubjectFiles, run_child};
 use crate::jobs::{Context, Error, Listener};
 use crate::media;
 use crate::store::Draft;
@@ -20,8 +20,8 @@ pub(in crate::jobs) const CHECK_TIME: Duration = Duration::from_secs(30);
 /// Checks the files in a draft, and leaves their poster beside them. Returns the format of the film. If the future is
 /// dropped, the child is killed.
 pub(in crate::jobs) async fn inspect(context: &Context, draft: &Draft) -> Result<Film, Error> {
-    let listener = Listener::new(&[]);
-    let running = run_child(context, None, None, draft, &listener);
+    let (listener, subject) = (Listener::new(&[]), SubjectFiles::default());
+    let running = run_child(context, None, &subject, draft, &listener);
     match timeout(context.check_time, running).await {
         Ok(Ok(End::Inspected(film))) => Ok(film),
         Ok(Ok(_)) => Err(std::io::Error::other("a check of received files has no result").into()),

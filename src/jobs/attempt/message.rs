@@ -18,6 +18,8 @@ pub(super) struct Order {
     pub(super) job: Option<Job>,
     /// Folder with the files of the footage or library that a job works on; empty for a sample.
     pub(super) subject: PathBuf,
+    /// Folder with the files of the footage from which the library of a views job was made; else empty.
+    pub(super) film: PathBuf,
     /// Number of threads to use.
     pub(super) threads: usize,
     /// Limit of the memory, bytes.

@@ -23,10 +23,12 @@ pub(super) use process::compute;
 pub use reporter::Reporter;
 
 use super::Error;
+use crate::media::Limits;
 use crate::store::Spill;
+use flockreel_core::analysis::Params;
 use flockreel_core::formats::library_dir;
 use flockreel_core::formats::library_json::FootageSummary;
-use flockreel_core::library::Library;
+use flockreel_core::library::{Library, Poses};
 use flockreel_core::progress::Progress;
 use flockreel_core::scratch::Scratch;
 use message::{Job, Order};
@@ -57,9 +59,28 @@ impl Attempt<'_> {
         Arc::new(Spill::into(self.folder))
     }
 
+    /// Returns the default limits of media tools, with the threads of this attempt.
+    pub fn limits(&self) -> Limits {
+        Limits {
+            threads: u32::try_from(self.threads()).unwrap_or(0),
+            ..Limits::default()
+        }
+    }
+
     /// Returns the path of a file of the footage or library that the job works on. The file may be absent.
     pub fn subject_file(&self, name: &str) -> PathBuf {
         self.order.subject.join(name)
+    }
+
+    /// Returns the path of a file of the footage from which the library of a views job was made.
+    pub fn film_file(&self, name: &str) -> PathBuf {
+        self.order.film.join(name)
+    }
+
+    /// Reads the poses and the parameters of the library that the job works on, and nothing else of it.
+    pub fn measurement(&self) -> Result<(Poses, Params), Error> {
+        let poses = library_dir::read_poses(&self.order.subject)?;
+        Ok((poses, library_dir::read_params(&self.order.subject)?))
     }
 
     /// Returns the hash and size of the footage that the job works on. Fails if that is no footage.

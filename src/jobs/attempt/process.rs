@@ -24,8 +24,8 @@ use crate::jobs::sample::FILM_NAME;
 use crate::jobs::{Context, Error, Listener, Subject, refusal, subject};
 use crate::store::blobs::hex;
 use crate::store::footage::{BACKGROUND, Footage, MASKS, SampleFootage, VIDEO};
-use crate::store::jobs::Lease;
 use crate::store::jobs::finish::{Outcome, Source};
+use crate::store::jobs::{Kind, Lease};
 use crate::store::owners::OwnerFilter;
 use crate::store::resources::{Library, Resource};
 use crate::store::{Draft, Fetched};
@@ -43,10 +43,13 @@ const MAX_LINE_BYTES: u64 = 4 << 20;
 const OUT_OF_MEMORY: &[u8] = b"memory allocation of ";
 
 /// The files that an attempt works on. Copies are removed on drop.
-struct SubjectFiles {
+#[derive(Default)]
+pub(super) struct SubjectFiles {
     /// Id of the footage or library; `None` for a sample, which is made of nothing.
     id: Option<Uuid>,
     files: Option<Fetched>,
+    /// Files of the footage from which the library of a views job was made.
+    film: Option<Fetched>,
     footage: Option<FootageSummary>,
 }
 
@@ -93,13 +96,9 @@ async fn fetch_subject(context: &Context, lease: &Lease) -> Result<SubjectFiles,
     let store = &context.store;
     let subject = subject(lease.kind, &lease.input)?;
     let Some(subject) = subject else {
-        return Ok(SubjectFiles {
-            id: None,
-            files: None,
-            footage: None,
-        });
+        return Ok(SubjectFiles::default());
     };
-    let (files, footage) = match subject {
+    let (files, film, footage) = match subject {
         Subject::Footage(id) => {
             let row = row::<Footage>(context, id.0).await?;
             let files = store.fetch(&row.folder, &[VIDEO, BACKGROUND, MASKS]).await;
@@ -107,16 +106,24 @@ async fn fetch_subject(context: &Context, lease: &Lease) -> Result<SubjectFiles,
                 sha256: hex(&row.sha256),
                 n_bytes: row.size_bytes.unsigned_abs(),
             };
-            (files?, Some(footage))
+            (files?, None, Some(footage))
         }
         Subject::Library(id) => {
             let row = row::<Library>(context, id.0).await?;
-            (store.fetch(&row.folder, &library_dir::FILES).await?, None)
+            let (names, film) = if lease.kind == Kind::Views {
+                let footage = self::row::<Footage>(context, row.footage_id).await?;
+                let film = store.fetch(&footage.folder, &[VIDEO]).await?;
+                (&library_dir::MEASUREMENT[..], Some(film))
+            } else {
+                (&library_dir::FILES[..], None)
+            };
+            (store.fetch(&row.folder, names).await?, film, None)
         }
     };
     Ok(SubjectFiles {
         id: Some(subject.id()),
         files: Some(files),
+        film,
         footage,
     })
 }
@@ -142,8 +149,7 @@ async fn compute_in(
         input: lease.input.clone(),
         footage: subject.footage.clone(),
     };
-    let files = subject.files.as_ref().map(|files| files.path());
-    match run_child(context, Some(job), files, draft, listener).await? {
+    match run_child(context, Some(job), subject, draft, listener).await? {
         End::Done(product, files) => Ok((product, files)),
         _ => Err(io::Error::other("an attempt has no result").into()),
     }
@@ -153,14 +159,15 @@ async fn compute_in(
 pub(super) async fn run_child(
     context: &Context,
     job: Option<Job>,
-    subject: Option<&Path>,
+    subject: &SubjectFiles,
     draft: &Draft,
     listener: &Listener,
 ) -> Result<End, Error> {
     let tools = spawn_blocking(media::found_tools).await;
     let order = Order {
         job,
-        subject: subject.map_or_else(Default::default, Into::into),
+        subject: path(&subject.files),
+        film: path(&subject.film),
         threads: context.threads,
         memory_bytes: context.memory_bytes,
         tools: tools.map_err(io::Error::other)??,
@@ -173,6 +180,11 @@ pub(super) async fn run_child(
         End::Failed(failure) => Err(Error::Attempt(failed(failure, draft))),
         end => Ok(end),
     }
+}
+
+/// Returns the folder of fetched files; an empty path if there are none.
+fn path(files: &Option<Fetched>) -> PathBuf {
+    (files.as_ref()).map_or_else(Default::default, |files| files.path().to_owned())
 }
 
 /// Returns the command of a child. It inherits no environment, which may hold secrets.

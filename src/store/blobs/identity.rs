@@ -163,7 +163,15 @@ mod tests {
         let names = fs::read_dir(files.path()).unwrap();
         let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name()).collect();
         names.sort();
-        let wanted = ["fish", "flocks", "footage", "libraries", "store-id", "tmp"];
+        let wanted = [
+            "fish",
+            "flocks",
+            "footage",
+            "libraries",
+            "store-id",
+            "tmp",
+            "views",
+        ];
         assert_eq!(names, wanted, "a temporary file is left");
     }
 

@@ -33,9 +33,9 @@ impl Store {
     /// Claims the next job of a lane for a process. Returns `None` if no job is ready. A job that depends on another
     /// one is ready when that one is done.
     ///
-    /// Order of the jobs: owners with fewer running jobs first, then higher priority, then owners whose last
-    /// job started longer ago. Among the jobs of one owner small films go first, since a person waits for them,
-    /// then small measurements, then the others; older ones before later ones. Every second start goes to the
+    /// Order of the jobs: higher priority first, then owners with fewer running jobs, then owners whose last job
+    /// started longer ago. A job of low priority gets the usual one when it is late. Among the jobs of one owner small films go first, since a person waits for them,
+    /// then small measurements, then the others, then those of low priority; older ones before later ones. Every second start goes to the
     /// oldest job, if that is late, so that no job waits for ever.
     ///
     /// The counts of the owners are materialized, or SQLite would take them again for each queued job.
@@ -61,8 +61,9 @@ impl Store {
                  where j.state = 'queued' and j.run_at_ms <= $2 and (j.small or not $4) \
                  and (j.after_job is null \
                       or exists (select 1 from jobs a where a.id = j.after_job and a.state = 'done')) \
-                 order by t.n_running, j.priority desc, coalesce(t.last_ms, 0), \
-                 case when t.n_started % 2 = 1 and j.created_ms <= $5 then 0 \
+                 order by case when j.priority < 0 and j.created_ms <= $5 then 0 else j.priority end desc, \
+                 t.n_running, coalesce(t.last_ms, 0), \
+                 case when t.n_started % 2 = 1 and j.created_ms <= $5 then 0 when j.priority < 0 then 4 \
                       when j.small and j.kind <> 'analysis' then 1 when j.small then 2 else 3 end, \
                  j.id limit 1 for update of j skip locked) \
              returning id as job_id, kind, input, result_id, attempt, fence, own_crashes, transient_ends, \

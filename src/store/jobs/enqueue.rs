@@ -5,7 +5,7 @@ use sqlx::types::Uuid;
 
 use super::follow::{cancel_followers, fail_followers};
 use super::trace::{self, TraceParent};
-use super::{JobState, Kind};
+use super::{JobState, Kind, Lease};
 use crate::store::owners::{Account, Owner};
 use crate::store::{Error, Store, Transaction, sql};
 use flockreel_core::ids::JobId;
@@ -14,6 +14,11 @@ use flockreel_core::ids::JobId;
 pub(in crate::store) const QUEUE_LOCK: &str = "queue";
 /// Name of the notification about new jobs.
 pub(super) const QUEUED: &str = "flockreel_jobs";
+/// Priority of jobs that nobody waits for: below the usual one.
+const BACKGROUND_PRIORITY: i64 = -1;
+/// SQL condition of the jobs that count against the limits of their owner and of the queue. Background jobs do not: each
+/// belongs to a library, whose own job counted.
+const COUNTED: &str = "state in ('queued', 'running') and priority >= 0";
 
 /// A job to be queued.
 #[derive(Clone, Debug)]
@@ -54,13 +59,12 @@ impl Store {
         if is_queued_already(&mut transaction, job).await? {
             return Ok(());
         }
-        let added = sql::query(
+        let added = sql::query(format!(
             "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, \
              created_ms, owner, small, traceparent) select $1, $2, 'queued', $3, $4, $5, $6, $7, $7, $8, $11, $12 \
-             where ($9 is null or $9 > (select count(*) from jobs \
-             where owner = $8 and state in ('queued', 'running'))) \
-             and $10 > (select count(*) from jobs where state in ('queued', 'running'))",
-        )
+             where ($9 is null or $9 > (select count(*) from jobs where owner = $8 and {COUNTED})) \
+             and $10 > (select count(*) from jobs where {COUNTED})"
+        ))
         .bind(job.job_id.0)
         .bind(job.kind.name())
         .bind(&job.input)
@@ -101,6 +105,35 @@ impl QueuedJobs {
     pub async fn next(&mut self) -> Result<(), Error> {
         Ok(self.0.next().await?)
     }
+}
+
+/// Adds the job that makes the views of a library, after the analysis that made it. It has the owner and the trace of
+/// the analysis.
+pub(super) async fn enqueue_views(
+    transaction: &mut Transaction,
+    analysis: &Lease,
+    now_ms: i64,
+) -> Result<(), Error> {
+    let input = serde_json::json!({"library_id": analysis.result_id});
+    let job_id = Uuid::now_v7();
+    sql::query(
+        "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, created_ms, owner, \
+         small, traceparent) select $1, $2, 'queued', $3, $4, id, $5, $6, $6, owner, $7, traceparent \
+         from jobs where id = $8",
+    )
+    .bind(job_id)
+    .bind(Kind::Views.name())
+    .bind(input.to_string().as_str())
+    .bind(Uuid::now_v7())
+    .bind(BACKGROUND_PRIORITY)
+    .bind(now_ms)
+    .bind(false)
+    .bind(analysis.job_id.0)
+    .execute(&mut *transaction)
+    .await?;
+    transaction.notify(QUEUED).await?;
+    tracing::info!(job.id = %job_id, job.kind = Kind::Views.name(), "job queued");
+    Ok(())
 }
 
 /// Ends a new job whose predecessor has already failed or been cancelled. No later event would end it.
@@ -147,8 +180,8 @@ pub(super) async fn check_limits(
     {
         return Err(Error::QuotaExceeded { quota });
     }
-    let sql = "select count(*) from jobs where state in ('queued', 'running')";
-    let n_jobs: i64 = sql::query_scalar(sql).fetch_one(transaction).await?;
+    let count = sql::query_scalar(format!("select count(*) from jobs where {COUNTED}"));
+    let n_jobs: i64 = count.fetch_one(transaction).await?;
     if n_jobs > max_queued {
         return Err(Error::QueueFull { max_queued });
     }
@@ -156,7 +189,7 @@ pub(super) async fn check_limits(
 }
 
 async fn n_under_way(transaction: &mut Transaction, owner: &Owner) -> Result<i64, sqlx::Error> {
-    let sql = "select count(*) from jobs where owner = $1 and state in ('queued', 'running')";
+    let sql = format!("select count(*) from jobs where owner = $1 and {COUNTED}");
     let count = sql::query_scalar(sql).bind(owner);
     count.fetch_one(transaction).await
 }

@@ -1,9 +1,11 @@
 //! Finish: the job is done. The same transaction links its single result
-//! (docs/explanation/promises.md, "No job is lost" and "Stalled workers cannot overwrite").
+//! (docs/explanation/promises.md, "No job is lost" and "Stalled workers cannot overwrite"), and queues the job that
+//! makes the views of a new library.
 
 use sqlx::types::Uuid;
 
-use super::{Change, Lease};
+use super::enqueue::enqueue_views;
+use super::{Change, Kind, Lease};
 use crate::store::footage::{self, SampleFootage};
 use crate::store::owners::Owner;
 use crate::store::resources::ResourceKind;
@@ -63,6 +65,9 @@ impl Store {
                 .await?;
             blobs::insert(&mut transaction, &outcome.folder, &outcome.files).await?;
             insert(&mut transaction, lease, outcome, now_ms).await?;
+            if lease.kind == Kind::Analysis {
+                enqueue_views(&mut transaction, lease, now_ms).await?;
+            }
             transaction.commit().await?;
             tracing::info!(job.id = %lease.job_id, fence = lease.fence, "job done");
             Ok(Change::Made)

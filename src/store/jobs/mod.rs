@@ -44,6 +44,8 @@ pub enum Kind {
     Sample,
     /// Makes a library from footage.
     Analysis,
+    /// Makes the videos of a library. Queued by the service with the library.
+    Views,
     /// Makes a flock from a library.
     Flock,
     /// Makes a virtual fish from a library.
@@ -110,13 +112,20 @@ pub enum Change {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Kind; 4] = [Kind::Sample, Kind::Analysis, Kind::Flock, Kind::Fish];
+    pub const ALL: [Kind; 5] = [
+        Kind::Sample,
+        Kind::Analysis,
+        Kind::Views,
+        Kind::Flock,
+        Kind::Fish,
+    ];
 
     /// Returns the name used in the database and in the API.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Sample => "sample",
             Kind::Analysis => "analysis",
+            Kind::Views => "views",
             Kind::Flock => "flock",
             Kind::Fish => "fish",
         }
@@ -127,6 +136,7 @@ impl Kind {
         match self {
             Kind::Sample => ResourceKind::Footage,
             Kind::Analysis => ResourceKind::Library,
+            Kind::Views => ResourceKind::Views,
             Kind::Flock => ResourceKind::Flock,
             Kind::Fish => ResourceKind::Fish,
         }

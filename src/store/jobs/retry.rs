@@ -10,13 +10,14 @@ use flockreel_core::code::Code;
 use flockreel_core::ids::JobId;
 
 /// Returns whether another attempt may avoid a failure with this code: it came from a crash or a stop, from a machine
-/// that was busy or full, or from a limit that an operator can raise.
+/// that was busy or full, from a limit that an operator can raise, or from a full quota.
 pub fn may_pass(code: Code) -> bool {
     matches!(
         code,
         Code::CrashedWorker
             | Code::Internal
             | Code::StorageFull
+            | Code::OwnerStorageFull
             | Code::TimeLimit
             | Code::MemoryLimit
             | Code::DecoderCrashed

@@ -11,7 +11,7 @@ use crate::store::resources::ResourceKind;
 use crate::store::space::Amount;
 use crate::store::{Error, Store, sql};
 
-/// Kinds of resources in the order of their deletion: results before their sources.
+/// Kinds of resources in the order of their deletion: results before their sources. Views are deleted with their library.
 const ORDER: [ResourceKind; 4] = [
     ResourceKind::Fish,
     ResourceKind::Flock,
@@ -20,8 +20,9 @@ const ORDER: [ResourceKind; 4] = [
 ];
 
 /// Statement that continues with the jobs to delete: those that ended without a result before `$1`, unless a job that
-/// waited for them stays.
-const OLD_JOBS: &str = "from jobs where state in ('failed', 'cancelled') and finished_ms < $1 and id not in ( \
+/// waited for them stays. Jobs of views stay with their library, whose views they can still make.
+const OLD_JOBS: &str = "from jobs where state in ('failed', 'cancelled') and finished_ms < $1 and kind <> 'views' \
+    and id not in ( \
     with recursive needed (id) as ( \
         select after_job from jobs where after_job is not null \
             and not (state in ('failed', 'cancelled') and finished_ms < $1) \
@@ -114,7 +115,8 @@ impl Store {
     /// Returns the ids and sizes of the resources that nobody used since `before_ms` and that nothing needs.
     async fn unused(&self, kind: ResourceKind, before_ms: i64) -> Result<Vec<(Uuid, i64)>, Error> {
         let (table, kept) = (kind.plural(), kept(kind, "r"));
-        let sql = format!("select r.id, r.size_bytes from {table} r where not {kept}");
+        let size = kind.size();
+        let sql = format!("select r.id, {size} from {table} r where not {kept}");
         Ok(sql::query(sql)
             .bind(before_ms)
             .fetch_all(&self.reader)
@@ -146,7 +148,7 @@ fn kept(kind: ResourceKind, row: &str) -> String {
         )
     };
     let needed = match kind {
-        ResourceKind::Flock | ResourceKind::Fish => String::new(),
+        ResourceKind::Flock | ResourceKind::Fish | ResourceKind::Views => String::new(),
         ResourceKind::Library => [
             child(ResourceKind::Flock, "k", "library_id"),
             child(ResourceKind::Fish, "v", "library_id"),
@@ -211,5 +213,24 @@ mod tests {
             let retired = store.retire(retention, day + 1).await.unwrap();
             assert_eq!((retirable.n_jobs, retired.n_jobs), (n_jobs, n_jobs));
         }
+    }
+
+    #[tokio::test]
+    async fn ended_job_of_views_stays() {
+        let data = tempfile::tempdir().unwrap();
+        let store = fresh::open(data.path()).await;
+        let views = NewJob {
+            kind: Kind::Views,
+            ..job_after(None)
+        };
+        store.enqueue(&views, 0).await.unwrap();
+        let cancel = store.cancel(views.job_id, &OwnerFilter::All, 0);
+        cancel.await.unwrap();
+        let retention = Retention {
+            keep_days: 0,
+            keep_jobs_days: 1,
+        };
+        let retired = store.retire(retention, 10 * 24 * 3600 * 1000);
+        assert_eq!(retired.await.unwrap().n_jobs, 0);
     }
 }

@@ -1,6 +1,7 @@
 // Pictures of the animal in single frames: sprites of the atlas, or cuts out of the film where there is no atlas.
 // @ts-check
 import { releaseVideo } from "../app/element.js";
+import { viewsState } from "../app/views.js";
 import { loadAtlas } from "../flock/atlas.js";
 import { hasFile } from "./instrument.js";
 
@@ -71,6 +72,7 @@ export function createPictures(desk) {
       context.clearRect(0, 0, canvas.width, canvas.height);
     }
     const rest = wishes.filter(({ frame, canvas, mirrored }) => !drawSprite(/** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d")), frame, { x: canvas.width / 2, y: canvas.height / 2, zoom: zoomFor(canvas.width), mirrored }));
+    if (viewsState(library) !== "done") return undefined;
     const isBusy = wanted.length > 0;
     wanted = [...wanted.slice(0, 1), ...rest];
     if (!rest.length || isBusy) return;

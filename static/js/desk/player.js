@@ -1,8 +1,9 @@
 // The film: plays, steps by exact frames, follows the moment, and plays jumps (a second before, the cut, a
-// second after). Where the browser cannot play the film, a clock moves the moment.
+// second after). While there is no film, or where the browser cannot play it, a clock moves the moment.
 // @ts-check
 import { element, releaseVideo } from "../app/element.js";
 import { signal } from "../app/store.js";
+import { viewsState, watchViews } from "../app/views.js";
 import { say } from "../app/words.js";
 
 /** Time that is played before and after the cut of a jump, s. */
@@ -17,9 +18,10 @@ export function createPlayer(desk) {
   const { library, moment, life } = desk;
   const { fps } = library;
   const base = `/v1/libraries/${library.id}`;
-  const video = element("video", { src: `${base}/film.mp4`, poster: `${base}/poster.jpg`, muted: true, playsInline: true, preload: "auto", tabIndex: -1, "aria-label": say("desk.film") });
+  const video = element("video", { poster: `${base}/poster.jpg`, muted: true, playsInline: true, preload: "auto", tabIndex: -1, "aria-label": say("desk.film") });
   const isPlaying = signal(false);
-  const isBroken = signal(false);
+  const views = signal(viewsState(library));
+  const isBroken = signal(views.value !== "done");
   let rate = 1;
   /** Frame that the film shows or seeks. */
   let shown = -1;
@@ -124,8 +126,17 @@ export function createPlayer(desk) {
     [cut, until] = [jump, Math.max(desk.first + 1, jump.from)];
     play();
   }
+  watchViews(library, life, (state) => {
+    views.set(state);
+    if (state !== "done") return;
+    const goesOn = isPlaying.value;
+    pause();
+    isBroken.set(false);
+    video.src = `${base}/film.mp4`;
+    if (goesOn) play();
+  });
   return {
-    video, isPlaying, isBroken, play, pause, playJump,
+    video, views, isPlaying, isBroken, play, pause, playJump,
     toggle: () => (isPlaying.value ? pause() : play()),
     setRate: (/** @type {number} */ next) => { rate = next; video.playbackRate = next; restart(moment.value); },
     /** Moves by frames and stops. */

@@ -1,7 +1,9 @@
 // Still pictures out of the film: a frame, or the surroundings of a box in it, with the box or the measurement drawn
 // over it. A copy of the film is opened when the first picture comes into view, and fills one picture after another.
+// Until there is a film, the pictures show the background.
 // @ts-check
 import { element, releaseVideo } from "../app/element.js";
+import { watchViews } from "../app/views.js";
 import { colorsAt, loadPicture } from "./canvas.js";
 import { drawMarks } from "./marks.js";
 
@@ -18,9 +20,11 @@ export function createShots(desk) {
   const [width, height] = library.image_size_px;
   /** @type {{shot: Shot, canvas: HTMLCanvasElement}[]} */
   const wanted = [];
+  /** Pictures that were drawn without the film. @type {typeof wanted} */
+  const early = [];
   /** @type {HTMLVideoElement | null} */
   let film = null;
-  let isBroken = false;
+  let [isOpen, isBroken] = [false, false];
 
   const seek = () => { if (film && wanted.length) film.currentTime = (wanted[0].shot.frame - desk.first + 0.5) / library.fps; };
   const arrived = () => {
@@ -30,10 +34,17 @@ export function createShots(desk) {
   };
   const fail = async () => {
     isBroken = true;
+    early.push(...wanted.splice(0));
     const background = await loadPicture(`/v1/libraries/${library.id}/background.png`, life);
-    for (const one of wanted.splice(0)) if (background) draw(one, background);
+    if (isBroken && background) for (const one of early) draw(one, background);
   };
   function open() {
+    isOpen = true;
+    watchViews(library, life, (state) => { if (state === "done") openFilm(); else void fail(); });
+  }
+  function openFilm() {
+    isBroken = false;
+    wanted.push(...early.splice(0));
     film = Object.assign(document.createElement("video"), { src: `/v1/libraries/${library.id}/film.mp4`, muted: true, preload: "auto" });
     film.addEventListener("loadeddata", seek, { once: true });
     film.addEventListener("seeked", arrived, { signal: life });
@@ -46,8 +57,8 @@ export function createShots(desk) {
       observer.unobserve(target);
       wanted.push({ shot: /** @type {Shot} */ (shots.get(target)), canvas: /** @type {HTMLCanvasElement} */ (target) });
       if (isBroken) void fail();
-      else if (!film) open();
-      else if (wanted.length === 1 && film.readyState >= 2) seek();
+      else if (!isOpen) open();
+      else if (film && wanted.length === 1 && film.readyState >= 2) seek();
     }
   }, { rootMargin: "200px" });
   life.addEventListener("abort", () => observer.disconnect());

@@ -78,11 +78,12 @@ export function createStage(desk, { player, pictures }) {
     const isMirrored = player.isPastCut && desk.jump.value?.mirrored === true;
     node.classList.toggle("is-mirrored", isMirrored);
     const lacks = desk.isLoaded.value && !columns.value.detected[moment.value];
-    note.hidden = !lacks && !isMirrored;
-    note.textContent = lacks ? say("desk.not_seen") : isMirrored ? say("desk.mirrored_now") : "";
+    const views = player.views.value;
+    note.textContent = lacks ? say("desk.not_seen") : isMirrored ? say("desk.mirrored_now") : views === "done" ? "" : say(`views.${views}`);
+    note.hidden = !note.textContent;
     ask();
   };
-  for (const seen of [moment, columns, showsMarks, desk.isLoaded, player.isPlaying]) seen.watch(tell, life);
+  for (const seen of [moment, columns, showsMarks, desk.isLoaded, player.isPlaying, player.views]) seen.watch(tell, life);
   look.watch((now) => {
     node.dataset.look = now;
     canvas.setAttribute("aria-label", say(`desk.look.${now}.label`));
@@ -111,14 +112,19 @@ export function createStage(desk, { player, pictures }) {
  * @param {{look: Signal<Look>, showsMarks: Signal<boolean>, pictures: import("./pictures.js").Pictures, player: import("./player.js").Player, life: AbortSignal}} parts
  */
 function controlsOf({ look, showsMarks, pictures, player, life }) {
+  let isChosen = false;
   const radios = /** @type {Look[]} */ (["film", "background", "sprite", "difference"]).map((name) => {
-    const input = element("input", { type: "radio", name: "desk-look", value: name, checked: name === look.value, onchange: () => look.set(name) });
+    const input = element("input", { type: "radio", name: "desk-look", value: name, checked: name === look.value, onchange: () => { isChosen = true; look.set(name); } });
     return { name, input, label: element("label.choice", {}, input, element("span", {}, say(`desk.look.${name}`))) };
   });
   look.watch((now) => { for (const { name, input } of radios) input.checked = name === now; }, life);
   radios[2].label.hidden = true;
   void pictures.loaded.then((found) => { radios[2].label.hidden = !found; });
-  player.isBroken.watch((broken) => { radios[0].label.hidden = radios[3].label.hidden = broken; if (broken && (look.value === "film" || look.value === "difference")) look.set("background"); }, life);
+  player.isBroken.watch((broken) => {
+    radios[0].label.hidden = radios[3].label.hidden = broken;
+    if (broken && (look.value === "film" || look.value === "difference")) look.set("background");
+    if (!broken && !isChosen) look.set("film");
+  }, life);
   const marks = element("input", { type: "checkbox", checked: showsMarks.value, onchange: () => showsMarks.set(marks.checked) });
   return element("div.stage-controls", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("desk.look")), ...radios.map(({ label }) => label)), element("label.choice", {}, marks, element("span", {}, say("desk.marks"))));
 }

@@ -2,6 +2,7 @@
 // @ts-check
 import { element } from "../app/element.js";
 import { isCalm } from "../app/motion.js";
+import { watchViews } from "../app/views.js";
 import { say } from "../app/words.js";
 import { timeline } from "../parts/timeline.js";
 import { film } from "../reel/film.js";
@@ -36,13 +37,25 @@ export function createPair({ library, id, fish, startFrame, life, onRest }) {
     left.dataset.frame = String(frame);
   };
   const tell = (/** @type {boolean} */ isPlaying) => { time.setPlaying(isPlaying); flat?.setPlaying(isPlaying); onRest(isPlaying ? null : frame); };
-  const player = film({ src: `${base}/film.mp4`, poster: undefined, fps, n_frames: n, label: say("desk.film"), life, onFrame: show, onState: tell, onBroken });
+  const player = film({ src: undefined, poster: undefined, fps, n_frames: n, label: say("desk.film"), life, onFrame: show, onState: tell, onBroken: () => onBroken() });
 
-  // Where the browser cannot play the film, a clock moves both sides, and the background stands for the film.
-  function onBroken() {
+  // While there is no film, or where the browser cannot play it, a clock moves both sides, and the background stands for the film.
+  const still = element("img", { src: `${base}/background.png`, alt: "" });
+  function onBroken(sentence = say("fish.no_film")) {
     isBroken = true;
-    player.node.replaceWith(element("img", { src: `${base}/background.png`, alt: "" }));
+    player.node.replaceWith(still);
+    note.textContent = sentence;
     note.hidden = false;
+  }
+  function onFilm() {
+    const goesOn = isPlaying();
+    pause();
+    isBroken = false;
+    still.replaceWith(player.node);
+    note.hidden = true;
+    player.video.src = `${base}/film.mp4`;
+    player.seek(frame);
+    if (goesOn) player.play();
   }
   const tick = () => { show(frame + 1 < n ? frame + 1 : 0); };
   const setTicking = (/** @type {boolean} */ on) => { clearInterval(ticking); ticking = on ? setInterval(tick, 1000 / fps) : 0; tell(on); };
@@ -60,7 +73,7 @@ export function createPair({ library, id, fish, startFrame, life, onRest }) {
   const seek = (/** @type {number} */ to) => { pause(); show(to); player.seek(frame); onRest(frame); };
 
   const time = timeline({ life, seek, toggle });
-  const note = element("p.stage-note", { hidden: true }, say("fish.no_film"));
+  const note = element("p.stage-note", { hidden: true });
   const left = element("div.stage.film-stage", { "data-look": "film", onclick: toggle }, player.node, wireframe?.canvas, note);
   left.style.aspectRatio = size.join(" / ");
   const shows = element("input", { type: "checkbox", checked: true, onchange: () => { if (wireframe) wireframe.canvas.hidden = !shows.checked; } });
@@ -72,8 +85,9 @@ export function createPair({ library, id, fish, startFrame, life, onRest }) {
 
   time.setSpan(n, fps);
   show(startFrame ?? 0);
+  watchViews(library, life, (state) => { if (state === "done") onFilm(); else onBroken(say(`views.${state}`)); });
   if (startFrame !== null) player.seek(frame);
-  if (startFrame === null && !isCalm()) player.play();
+  if (startFrame === null && !isCalm()) play();
   return node;
 }
 

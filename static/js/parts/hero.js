@@ -3,6 +3,7 @@
 import { element, releaseVideo } from "../app/element.js";
 import { isCalm } from "../app/motion.js";
 import { filmName } from "../app/names.js";
+import { watchViews } from "../app/views.js";
 import { say, seconds } from "../app/words.js";
 import { living, loadPictures } from "./living.js";
 
@@ -35,8 +36,15 @@ export async function showFlock(stage, { library, planning, life, links }) {
   const flock = await living({ libraryId: library.id, plan, life, small, pictures, onState: tell });
   if (life.aborted) return;
   stage.style.setProperty("--ratio", String(plan.sizePx[0] / plan.sizePx[1]));
-  const film = element("video", { src: `${base}/film.mp4`, poster: `${base}/poster.jpg`, muted: true, loop: true, playsInline: true, autoplay: !isCalm(), "aria-label": say("home.film") });
-  const one = element("figure.hero-one", {}, film, element("figcaption", {}, say("hero.one", { time: seconds(Math.round(library.n_frames / library.fps)) })));
+  const film = element("video", { poster: `${base}/poster.jpg`, muted: true, loop: true, playsInline: true, "aria-label": say("home.film") });
+  const words = element("figcaption", { role: "status" });
+  const one = element("figure.hero-one", {}, film, words);
+  watchViews(library, life, (state) => {
+    words.textContent = state === "done" ? say("hero.one", { time: seconds(Math.round(library.n_frames / library.fps)) }) : say(`views.${state}`);
+    if (state !== "done") return;
+    film.autoplay = flock.player.isPlaying && !isCalm();
+    film.src = `${base}/film.mp4`;
+  });
   film.addEventListener("error", () => one.remove());
   life.addEventListener("abort", () => releaseVideo(film));
   pause.addEventListener("click", () => {

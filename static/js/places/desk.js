@@ -60,7 +60,7 @@ export async function show(root, { id, query, life }) {
     element("section", {}, element("h2", {}, say("desk.motion")), summaryCard(desk)),
     element("section", {}, element("h2", {}, say("desk.numbers")), numbers),
     element("section", {}, element("h2", {}, say("desk.advice")), element("p.soft", {}, say("desk.advice.help")), adviceCards(desk, { pictures, shoot, acts: { remeasure, showTab } })),
-    element("section", {}, element("h2", {}, say("desk.files")), downloadTable(library)));
+    element("section", {}, element("h2", {}, say("desk.files")), downloadTable(library, life)));
 
   const tellNumbers = () => numbers.replaceChildren(numberList({ library, head: desk.head.value, px_per_cm: desk.scale.value }));
   desk.head.watch(tellNumbers, life);

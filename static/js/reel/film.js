@@ -12,7 +12,7 @@ const EARLY = 0.3;
  */
 
 /**
- * @param {{src: string, poster: string | undefined, fps: number, n_frames: number, label: string, life: AbortSignal,
+ * @param {{src: string | undefined, poster: string | undefined, fps: number, n_frames: number, label: string, life: AbortSignal,
  *   onFrame: (frame: number) => void, onState: (isPlaying: boolean) => void, onBroken: () => void}} options
  * @returns {View & {video: HTMLVideoElement}}
  */

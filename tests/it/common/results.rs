@@ -89,13 +89,14 @@ fn id(value: &Value) -> String {
     value.as_str().unwrap().to_owned()
 }
 
-/// Ends the three queued jobs with substitute results.
+/// Ends the three queued jobs, and that of the views, with substitute results.
 async fn work(app: &TestApp) {
     let poses = "0,0.0\n".repeat(1000);
     for (name, summary) in [
         ("library.json", library_summary()),
         ("flock.json", flock_summary()),
         ("video.mp4", fish_summary()),
+        ("film.mp4", json!({})),
     ] {
         let commands = done(&[(name, "{}"), ("poses.csv", &poses)], &summary);
         let worker = Worker::new(with_script(&app.context, &commands));

@@ -113,9 +113,11 @@ async fn stopping_server_releases_its_job_without_counting_the_attempt() {
     assert_swept(&place).await;
 }
 
-/// Returns the entity tags (hashes of the content) of the files of a finished analysis.
+/// Returns the entity tags (hashes of the content) of the files of a finished analysis, when its views are done.
 async fn result_of(server: &Server, job: &Value) -> Vec<String> {
     let library = job["links"]["result"].as_str().unwrap();
+    let views = server.json(library).await["views"]["job_id"].clone();
+    assert_eq!(server.ended(&views).await["state"], "done");
     let mut tags = Vec::new();
     for file in [
         "library.json",
@@ -123,6 +125,8 @@ async fn result_of(server: &Server, job: &Value) -> Vec<String> {
         "background.png",
         "sprites.zip",
         "mattes.zip",
+        "poster.jpg",
+        "film.mp4",
         "overlay.mp4",
     ] {
         let url = format!("{}{library}/{file}", server.base);

@@ -39,7 +39,6 @@ async fn a_film_becomes_a_library_a_flock_and_a_virtual_fish() {
         ("trajectory.svg", b"<svg"),
         ("confidence.svg", b"<svg"),
         ("transitions.svg", b"<svg"),
-        ("overlay.mp4", b"\0\0\0"),
         ("poses.csv", b"frame"),
         ("sprites.zip", b"PK"),
         ("mattes.zip", b"PK"),

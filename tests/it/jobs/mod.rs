@@ -12,3 +12,4 @@ mod steps;
 mod sweeps;
 mod upgrades;
 mod uploads;
+mod views;

@@ -63,7 +63,7 @@ async fn queue_everything(server: &Server) -> (Vec<Value>, Vec<String>) {
             (
                 "libraries",
                 library,
-                &["library.json", "poses.json", "sprites.zip", "overlay.mp4"][..],
+                &["library.json", "poses.json", "sprites.zip", "poster.jpg"][..],
             ),
             ("flocks", &flock["flock_id"], &["flock.json", "video.mp4"]),
             ("fish", &fish["fish_id"], &["video.mp4", "model.glb"]),

@@ -152,3 +152,69 @@ async fn short_lane_is_for_small_jobs() {
     assert_eq!(claim(Lane::Short).await, Some(small));
     assert_eq!(claim(Lane::All).await, Some(large));
 }
+
+impl Queue {
+    /// Queues a job that nobody waits for.
+    async fn enqueue_in_background(&self, owner: &str, now_ms: i64) -> JobId {
+        let job = NewJob {
+            kind: Kind::Views,
+            priority: -1,
+            ..new_job(of(owner, 99))
+        };
+        self.store.enqueue(&job, now_ms).await.unwrap();
+        job.job_id
+    }
+}
+
+#[tokio::test]
+async fn background_jobs_wait_for_the_jobs_of_all_owners() {
+    let queue = Queue::open().await;
+    let views = queue.enqueue_in_background("a", 0).await;
+    let mut turns = Vec::new();
+    for owner in ["b", "b", "c"] {
+        queue.enqueue_as(owner, Kind::Analysis, false, 1).await;
+    }
+    for now_ms in 1..=4 {
+        turns.push(queue.run_next(now_ms).await);
+    }
+    assert_eq!(turns[3], views);
+}
+
+#[tokio::test]
+async fn late_background_jobs_take_turns_with_the_jobs_of_other_owners() {
+    let queue = Queue::open().await;
+    let views = queue.enqueue_in_background("a", 0).await;
+    let mut turns = Vec::new();
+    for start in 0..2 {
+        let now_ms = 700_000 + start;
+        for _ in 0..2 {
+            queue.enqueue_as("b", Kind::Flock, true, now_ms).await;
+        }
+        turns.push(queue.run_next(now_ms).await);
+    }
+    assert!(turns.contains(&views));
+}
+
+#[tokio::test]
+async fn background_jobs_do_not_count_against_limits() {
+    let queue = Queue::open().await;
+    queue.enqueue_in_background("a", 0).await;
+    let job = queue.charge(of("a", 1), None, 0).await.unwrap();
+    let charge = async |max_queued| {
+        let job = NewJob {
+            max_queued,
+            ..new_job(of("b", 9))
+        };
+        queue.store.enqueue(&job, 0).await
+    };
+    assert!(matches!(
+        charge(1).await,
+        Err(Error::QueueFull { max_queued: 1 })
+    ));
+    charge(2).await.unwrap();
+    let cancel = queue.store.cancel(job, &OwnerFilter::All, 1);
+    assert_eq!(cancel.await.unwrap(), Cancel::Cancelled);
+    let account = of("a", 1);
+    let retry = (queue.store).retry(job, &OwnerFilter::All, &account, 2, 2);
+    assert_eq!(retry.await.unwrap(), retry::Retry::Queued);
+}

@@ -100,6 +100,8 @@ const MAX_PIXELS: u64 = 1 << 27;
 /// Files from which a library is read; the folder may hold others. One of the archives is sufficient, and
 /// only some libraries have occluders.
 pub const FILES: [&str; 6] = [LIBRARY, POSES, BACKGROUND, OCCLUDERS, MATTES, SPRITES];
+/// Files from which poses and parameters are read.
+pub const MEASUREMENT: [&str; 2] = [LIBRARY, POSES];
 
 /// Writes a library into a folder, which is created if needed.
 pub fn write(
@@ -153,14 +155,23 @@ pub fn read_poses(dir: &Path) -> Result<Poses, Error> {
     Ok(poses)
 }
 
+/// Reads only the parameters of the analysis from a library folder.
+pub fn read_params(dir: &Path) -> Result<Params, Error> {
+    Ok(read_summary(dir)?.params)
+}
+
+fn read_summary(dir: &Path) -> Result<library_json::Summary, Error> {
+    let summary = library_json::read(&read_file(dir, LIBRARY)?);
+    summary.map_err(|cause| Error::Json {
+        file: LIBRARY,
+        cause,
+    })
+}
+
 /// Reads a library from a folder and stores its mattes in `scratch`.
 pub fn read(dir: &Path, scratch: Arc<dyn Scratch>) -> Result<StoredLibrary, Error> {
     let read_file = |file| read_file(dir, file);
-    let summary = library_json::read(&read_file(LIBRARY)?);
-    let summary = summary.map_err(|cause| Error::Json {
-        file: LIBRARY,
-        cause,
-    })?;
+    let summary = read_summary(dir)?;
     let poses = read_poses(dir)?;
     limits::check(&summary, poses.frames.len())?;
     let background = picture::read_rgb(&read_file(BACKGROUND)?, poses.image_size_px);
