@@ -1,11 +1,13 @@
 """Fixtures: running services, films made by flockreel, and Debian's chromium."""
 
+import json
 import os
 import re
 import shutil
 import subprocess
 import sys
 import urllib.parse
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -61,12 +63,15 @@ def filled_service(tmp_path_factory, film):
 
 
 def fill(address, film):
-    """Measures a film and makes a flock of it. Returns the ids of the footage, the library and the flock."""
+    """Measures a film and makes a flock of it. Returns the ids of the footage, the library and the flock, when the library
+    has its views."""
     name = urllib.parse.quote(film.name)
     footage = post(f"{address}/v1/footage?name={name}", film.read_bytes(), "video/mp4")
     analysis = post(f"{address}/v1/analyses", {"footage_id": footage["id"]})
     flock = post(f"{address}/v1/flocks", {"library_id": analysis["library_id"], "count": 6, "frames": 60})
     wait_for_job(address, flock["job_id"])
+    library = json.load(urllib.request.urlopen(f"{address}/v1/libraries/{analysis['library_id']}"))
+    wait_for_job(address, library["views"]["job_id"])
     return footage["id"], analysis["library_id"], flock["flock_id"]
 
 
