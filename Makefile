@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy programs unit scale-test race guards truth-test page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service hostile transitions page-bench screenshots count ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy programs unit scale-test race guards truth-test page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service hostile transitions swift page-bench screenshots count ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -163,6 +163,9 @@ hostile: build target/bench-venv/ready ## measure what one hostile token at full
 
 transitions: target/bench-venv/ready ## measure how the search for transitions grows with the film
 	$(BENCH) bench/transitions.py --most 50000 --write
+
+swift: build target/bench-venv/ready ## time the way from a film to its living flock against an older program: make swift OLD=program FILMS="a.mp4 b.mp4"
+	$(BENCH) bench/swift.py $(RELEASE) $(OLD) $(FILMS) --write
 
 page-bench: vendor build target/bench-venv/ready ## measure the page in Chromium
 	@scripts/system-packages.sh page-test

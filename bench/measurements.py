@@ -36,7 +36,7 @@ def section(result):
 
 # Sections in the order of the page.
 SECTIONS = {"accuracy": accuracy.page, "flocks": flocks.page, "papers": section, "ablation": ablation.page, "speed": section,
-            "transitions": section, "service": section, "hostile": section, "page": section, "soak": section, "rebuild": section, "count": section}
+            "transitions": section, "swift": section, "service": section, "hostile": section, "page": section, "soak": section, "rebuild": section, "count": section}
 
 
 def save(name, result):
