@@ -70,6 +70,9 @@ pub enum Error {
     /// The disk has too little space for the job's output.
     #[error("the disk has too little free space for the output of the job")]
     DiskFull,
+    /// The job returns to the queue, because one of higher priority waits.
+    #[error("the job gave way to another one")]
+    GaveWay,
     /// No permit for work during a request became free in time ([`super::ConcurrencyLimit`]).
     #[error("the service is too busy: try again soon")]
     Busy,
@@ -113,7 +116,7 @@ impl Error {
             Error::TimeLimit => Code::TimeLimit,
             Error::DiskFull => Code::StorageFull,
             Error::Busy => Code::Busy,
-            Error::Cancelled => Code::Cancelled,
+            Error::GaveWay | Error::Cancelled => Code::Cancelled,
         }
     }
 

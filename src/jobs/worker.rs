@@ -45,7 +45,7 @@ pub enum Step {
     Retried(JobId),
     /// The job was cancelled while it ran.
     Cancelled(JobId),
-    /// The job returned to the queue because the process stops.
+    /// The job returned to the queue because the process stops, or because a job of higher priority waits.
     Released(JobId),
     /// The lease was lost. Nothing of this attempt was kept.
     Lost(JobId),
@@ -106,7 +106,7 @@ impl Worker {
     }
 
     /// Renews the lease, stores progress and passes on cancellation until the computation ends. Cancels it at
-    /// the time limit, if disk space is short, or if the process stops.
+    /// the time limit, if disk space is short, to give way, or if the process stops.
     async fn beat_until_done(
         &self,
         lease: &Lease,
@@ -118,15 +118,16 @@ impl Worker {
         tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (start, mut last_beat) = (Instant::now(), Instant::now());
         let mut stored_position = listener.position();
-        let mut lacks_disk_space = false;
+        let mut reason = None;
         loop {
             tokio::select! {
-                ended = &mut work => return self.with_stop_reason(start, lacks_disk_space, ended),
+                ended = &mut work => return with_stop_reason(reason, ended),
                 _ = tick.tick() => {}
             }
-            lacks_disk_space |= self.context.lacks_disk_space();
-            let is_late = start.elapsed() > self.context.budget;
-            if is_late || lacks_disk_space || self.context.draining.is_cancelled() {
+            if reason.is_none() {
+                reason = self.reason_to_stop(lease, start).await;
+            }
+            if reason.is_some() || self.context.draining.is_cancelled() {
                 listener.cancel();
             }
             let position = listener.position();
@@ -137,25 +138,22 @@ impl Worker {
         }
     }
 
-    /// Replaces the error of a computation that was stopped for its time limit or for lack of disk space. The
-    /// error then states that reason.
-    fn with_stop_reason(
-        &self,
-        start: Instant,
-        lacks_disk_space: bool,
-        result: Result<Outcome, Error>,
-    ) -> Result<Outcome, Error> {
-        let reason = if lacks_disk_space {
-            Error::DiskFull
-        } else if start.elapsed() > self.context.budget {
-            Error::TimeLimit
-        } else {
-            return result;
+    /// Returns why a computation that began at `start` must stop, if it must.
+    async fn reason_to_stop(&self, lease: &Lease, start: Instant) -> Option<Error> {
+        let lacks_space = self.context.lacks_disk_space();
+        if lacks_space {
+            return Some(Error::DiskFull);
+        }
+        let is_late = start.elapsed() > self.context.budget;
+        if is_late {
+            return Some(Error::TimeLimit);
+        }
+        let gives_way = async {
+            let now_ms = self.context.now_ms().await?;
+            self.context.store.must_give_way(lease, now_ms).await
         };
-        result.map_err(|error| {
-            tracing::warn!(%error, %reason, "a job was stopped");
-            reason
-        })
+        // Without an answer of the database, the job goes on.
+        gives_way.await.unwrap_or(false).then_some(Error::GaveWay)
     }
 
     async fn beat(&self, lease: &Lease, listener: &Listener, at: Position) {
@@ -191,6 +189,7 @@ impl Worker {
         };
         let (change, step) = match result {
             Ok(change) => (change, Step::Done(job)),
+            Err(Error::GaveWay) => (store.release(lease).await?, Step::Released(job)),
             // Who stops the service may stop the processes of its jobs, too.
             Err(error)
                 if is_draining && (was_stopped(&error, listener) || may_pass(error.code())) =>
@@ -235,6 +234,20 @@ async fn finish(store: &Store, lease: &Lease, outcome: &Outcome) -> Result<Chang
         }
         Err(error) if store.is_linked_after(&outcome.folder, &error).await? => Ok(Change::Made),
         change => change,
+    }
+}
+
+/// Replaces the error of a computation that was stopped for this reason.
+fn with_stop_reason(
+    reason: Option<Error>,
+    result: Result<Outcome, Error>,
+) -> Result<Outcome, Error> {
+    match (result, reason) {
+        (Err(error), Some(reason)) => {
+            tracing::info!(%error, %reason, "a job was stopped");
+            Err(reason)
+        }
+        (result, _) => result,
     }
 }
 

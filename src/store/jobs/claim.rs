@@ -10,6 +10,10 @@ use crate::store::{Error, Store, sql};
 /// Time in the queue after which a job is late, milliseconds. Free choice.
 const LATE_MS: i64 = 600_000;
 
+/// Time for which a job must have been ready before one of low priority gives way to it, milliseconds. An idle worker takes
+/// it sooner. Free choice.
+const GIVE_WAY_MS: i64 = 1_000;
+
 /// The jobs that a worker runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lane {
@@ -80,5 +84,19 @@ impl Store {
             tracing::info!(job.id = %lease.job_id, job.kind = lease.kind.name(), attempt = lease.attempt, fence = lease.fence, "job claimed");
         }
         Ok(lease)
+    }
+
+    /// Returns whether a running job must give way: it has a low priority, is not late, and no worker takes a job of
+    /// higher priority that is ready.
+    pub async fn must_give_way(&self, lease: &Lease, now_ms: i64) -> Result<bool, Error> {
+        let sql = "select exists (select 1 from jobs r join jobs j on j.priority > r.priority \
+                   where r.id = $1 and r.priority < 0 and r.created_ms > $2 \
+                   and j.state = 'queued' and j.run_at_ms <= $3 and (j.after_job is null or exists ( \
+                   select 1 from jobs a where a.id = j.after_job and a.state = 'done' and a.finished_ms <= $3)))";
+        let exists = sql::query_scalar(sql)
+            .bind(lease.job_id.0)
+            .bind(now_ms - LATE_MS)
+            .bind(now_ms - GIVE_WAY_MS);
+        Ok(exists.fetch_one(&self.reader).await?)
     }
 }

@@ -199,6 +199,9 @@ async fn deletion_works_with_zero_free_bytes_and_service_recovers() {
         assert!(freed.elapsed() < RECOVERY, "{:?}", freed.elapsed());
         let done = server.ended(&accepted["job_id"]).await;
         assert_eq!(done["state"], "done", "{done}");
+        // The only worker must be free when the next disk is.
+        let library = server.json(done["links"]["result"].as_str().unwrap()).await;
+        server.ended(&library["views"]["job_id"]).await;
     }
     assert_eq!(server.terminate(), Some(0));
     assert_sound(place.data());

@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 
 use flockreel::store::Store;
 use flockreel::store::footage::{Added, Footage, VIDEO};
+use flockreel::store::jobs::cancel::Cancel;
 use flockreel::store::jobs::enqueue::NewJob;
 use flockreel::store::jobs::finish::{Outcome, Source};
 use flockreel::store::jobs::{Change, JobState, Kind};
@@ -80,6 +81,12 @@ async fn library(store: &Store) -> Uuid {
     let lease = lease.unwrap().unwrap();
     let made = outcome(footage.id, lease.result_id);
     assert_eq!(store.finish(&lease, &made, 0).await.unwrap(), Change::Made);
+    // The job of its views does not take part.
+    let jobs = store.jobs_under_way(0, &OwnerFilter::All).await.unwrap();
+    for views in jobs.iter().filter(|job| job.kind == Kind::Views) {
+        let cancel = store.cancel(views.id, &OwnerFilter::All, 0);
+        assert_eq!(cancel.await.unwrap(), Cancel::Cancelled);
+    }
     lease.result_id
 }
 

@@ -221,8 +221,9 @@ async fn old_jobs_without_a_result_are_deleted() {
         let states = jobs.map(|job| job["state"].as_str().unwrap().to_owned());
         states.collect::<Vec<_>>()
     };
-    let all = ["queued", "cancelled", "cancelled", "done", "done", "done"];
-    assert_eq!(states().await, all);
+    let done = vec!["done"; 4];
+    let ended = [vec!["queued", "cancelled", "cancelled"], done.clone()].concat();
+    assert_eq!(states().await, ended);
     let retention = Retention {
         keep_days: 0,
         keep_jobs_days: 30,
@@ -234,7 +235,7 @@ async fn old_jobs_without_a_result_are_deleted() {
         let retired = store.retire(retention, later_ms).await.unwrap();
         assert_eq!((retirable.n_jobs, retired.n_jobs), (n_jobs, n_jobs));
     }
-    assert_eq!(states().await, ["queued", "done", "done", "done"]);
+    assert_eq!(states().await, [vec!["queued"], done].concat());
     app.assert_sound().await;
 }
 

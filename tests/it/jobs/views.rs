@@ -205,6 +205,29 @@ async fn views_of_a_lost_worker_are_made_once() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn views_give_way_to_a_job_that_waits() {
+    let waiting = Waiting::substitute(TestApp::idle().await).await;
+    let worker = waiting.worker(UNTIL_STOPPED);
+    let running = tokio::spawn(async move { worker.step().await.unwrap() });
+    waiting.until_running().await;
+    let id = waiting.library.rsplit('/').next().unwrap();
+    let fish = waiting.app.accept("/v1/fish", json!({"library_id": id}));
+    let fish: JobId = fish.await["job_id"].as_str().unwrap().parse().unwrap();
+    let step = tokio::time::timeout(Duration::from_secs(30), running).await;
+    assert_eq!(step.unwrap().unwrap(), Step::Released(waiting.job));
+    let job = waiting.app.json(&format!("/v1/jobs/{}", waiting.job)).await;
+    assert_eq!(
+        (&job["state"], &job["attempt"]),
+        (&json!("queued"), &json!(0))
+    );
+    let next = waiting.worker(&made("new"));
+    assert_eq!(next.step().await.unwrap(), Step::Done(fish));
+    assert_eq!(next.step().await.unwrap(), Step::Done(waiting.job));
+    waiting.assert_made("new").await;
+    waiting.app.assert_sound().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn deletion_of_a_library_stops_its_views() {
     let waiting = Waiting::substitute(TestApp::idle().await).await;
     let worker = waiting.worker(UNTIL_STOPPED);

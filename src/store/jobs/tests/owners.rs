@@ -218,3 +218,24 @@ async fn background_jobs_do_not_count_against_limits() {
     let retry = (queue.store).retry(job, &OwnerFilter::All, &account, 2, 2);
     assert_eq!(retry.await.unwrap(), retry::Retry::Queued);
 }
+
+#[tokio::test]
+async fn background_job_gives_way_to_a_ready_job_until_it_is_late() {
+    let queue = Queue::open().await;
+    queue.enqueue_in_background("a", 0).await;
+    let views = queue.claim(0).await.unwrap();
+    let gives_way = async |now_ms| queue.store.must_give_way(&views, now_ms).await.unwrap();
+    assert!(!gives_way(5_000).await, "nobody waits");
+    queue.enqueue_in_background("b", 5_000).await;
+    assert!(!gives_way(9_000).await, "only another background job waits");
+    let before = queue.enqueue_as("c", Kind::Analysis, false, 10_000).await;
+    assert!(!gives_way(10_500).await, "another worker may take it");
+    assert!(gives_way(11_000).await);
+    assert!(!gives_way(600_000).await, "it is late");
+    let flock = queue.claim(11_000).await.unwrap();
+    assert_eq!(flock.job_id, before);
+    queue.charge(of("c", 9), Some(before), 0).await.unwrap();
+    assert!(!gives_way(12_000).await, "its predecessor is not done");
+    let way = queue.store.must_give_way(&flock, 12_000).await.unwrap();
+    assert!(!way, "a job of usual priority");
+}
