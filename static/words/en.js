@@ -40,7 +40,7 @@ export default {
   "home.step.flock": "Flock", "home.step.flock.help": "The frames of the one animal become as many animals as you like.",
   "home.looking": "Looking for flocks…", "home.waiting": "Your first flock is being made. It appears here as soon as it is ready.", "home.waiting.sample": "A virtual goldfish is being filmed, so that you can see a flock at once. It appears here as soon as it is ready.", "home.failed": "The film could not be measured. Its page gives the reason.", "home.empty": "No flock yet. Choose a film of one animal.",
   "home.film": "The film of the one animal", "home.open": "Open this flock", "home.play": "Play with it",
-  "views.making": "The film is being prepared. It plays here as soon as it is ready.", "views.failed": "The film could not be prepared. The list of jobs says why.", "views.making.short": "being made", "views.failed.short": "not made; see the list of jobs",
+  "views.making": "The film is being prepared. It plays here soon.", "views.failed": "The film could not be prepared. The list of jobs says why.", "views.making.short": "being made", "views.failed.short": "not made; see the list of jobs",
   "hero.one": "One animal, filmed for {time}", "hero.times": "× {n}", "hero.caption": { one: "The animal of the film “{film}”.", other: "All {n} are the same animal, from the film “{film}”." }, "hero.chase": "Chase them with the pointer or a finger.",
   "living.n": { one: "{n} animal", other: "{n} animals" }, "living.rest": "resting", "living.all_ways": "heading in different directions", "living.heading": "most heading {direction}", "living.groups": { one: "in one group", other: "in {n} groups" },
   "playing": "They react to the pointer. This motion is not part of the flock that was made.",

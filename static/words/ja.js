@@ -39,7 +39,7 @@ export default {
   "home.step.flock": "群れ", "home.step.flock.help": "その動物のフレームから、好きな個体数の群れを作ります。",
   "home.looking": "群れを探しています…", "home.waiting": "最初の群れを作成しています。できあがると、ここに表示します。", "home.waiting.sample": "すぐに群れを見られるように、仮想の金魚を撮影しています。できあがると、ここに表示します。", "home.failed": "動画を計測できませんでした。動画のページで原因を確認できます。", "home.empty": "群れはまだありません。動物が1個体だけ映った動画を選んでください。",
   "home.film": "元になった1個体の動画", "home.open": "この群れを開く", "home.play": "スタジオで動かす",
-  "views.making": "動画を準備しています。準備ができしだい、ここで再生します。", "views.failed": "動画を準備できませんでした。理由はジョブの一覧にあります。", "views.making.short": "準備中", "views.failed.short": "作成できませんでした（ジョブの一覧を参照）",
+  "views.making": "動画を準備中です。まもなくここで再生します。", "views.failed": "動画を準備できませんでした。理由はジョブの一覧にあります。", "views.making.short": "準備中", "views.failed.short": "作成できませんでした（ジョブの一覧を参照）",
   "hero.one": "撮影した1個体（{time}）", "hero.times": "× {n}個体", "hero.caption": "{n}個体はすべて、動画「{film}」に映った同じ1個体です。", "hero.chase": "ポインターや指で追いかけると逃げます。",
   "living.n": "{n}個体", "living.rest": "静止", "living.all_ways": "向きはばらばら", "living.heading": "多くは{direction}向き", "living.groups": "{n}グループ",
   "playing": "ポインターに反応している間だけの動きです。作成した群れの動きではありません。",

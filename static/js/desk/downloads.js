@@ -27,7 +27,7 @@ export function downloadTable(library, life) {
 function fileLink(library, name, life) {
   const link = element("a", { href: `/v1/libraries/${library.id}/${encodeURIComponent(name)}`, download: "" }, name);
   if (!VIEWS.includes(name)) return link;
-  const node = element("span");
+  const node = element("span.file-name");
   watchViews(library, life, (state) => {
     if (state === "done") node.replaceChildren(link);
     else node.replaceChildren(`${name} · ${say(`views.${state}.short`)}`);

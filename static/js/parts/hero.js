@@ -41,7 +41,8 @@ export async function showFlock(stage, { library, planning, life, links }) {
   const one = element("figure.hero-one", {}, film, words);
   watchViews(library, life, (state) => {
     words.textContent = state === "done" ? say("hero.one", { time: seconds(Math.round(library.n_frames / library.fps)) }) : say(`views.${state}`);
-    if (state !== "done") return;
+    if (state !== "done") return void (words.dataset.views = state);
+    delete words.dataset.views;
     film.autoplay = flock.player.isPlaying && !isCalm();
     film.src = `${base}/film.mp4`;
   });
