@@ -10,7 +10,7 @@ use crate::store::{Error, Store, sql};
 pub struct Census {
     /// Number of jobs by kind and state. Combinations without jobs are left out.
     pub jobs: Vec<(Kind, JobState, i64)>,
-    /// Earliest time since which a queued job could run, milliseconds since 1970; `None` if none could. A job that
+    /// Earliest time since which a queued job of usual priority could run, milliseconds since 1970; `None` if none could. A job that
     /// needs the result of another could run since that one was done.
     pub waiting_since_ms: Option<i64>,
     /// Size of the files by type of data, bytes. `uploads` counts unfinished uploads only.
@@ -30,7 +30,7 @@ impl Store {
         let jobs = jobs.collect::<Result<_, Error>>()?;
         let sql = "select min(case when a.finished_ms > j.run_at_ms then a.finished_ms else j.run_at_ms end) \
                    from jobs j left join jobs a on a.id = j.after_job \
-                   where j.state = 'queued' and (j.after_job is null or a.state = 'done')";
+                   where j.state = 'queued' and j.priority >= 0 and (j.after_job is null or a.state = 'done')";
         let waiting_since_ms = sql::query_scalar(sql).fetch_one(&self.reader).await?;
         let sources = ResourceKind::ALL.map(|kind| (kind.plural(), "size_bytes", kind.plural()));
         let uploads = (

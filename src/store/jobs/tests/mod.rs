@@ -219,6 +219,8 @@ async fn requeued_job_waits_and_counts_the_attempt_and_its_end() {
 async fn waiting_time_begins_when_a_job_could_run() {
     let queue = Queue::open().await;
     let since = async || queue.store.census().await.unwrap().waiting_since_ms;
+    queue.enqueue_at(None, -1).await;
+    assert_eq!(since().await, None, "nobody waits for a background job");
     let first = queue.enqueue(None).await;
     queue.enqueue(Some(first)).await;
     assert_eq!(since().await, Some(0));

@@ -14,19 +14,21 @@ pub(super) const TOKEN: &str = "frl_00000000ann_abcdefghijklmnopqrstuvwxyzABCDEF
 /// Secret that signs links.
 pub(super) const LINK_KEY: [u8; 32] = [7; 32];
 
-/// Folders of stored files with the name and content of their only file, from the schema on that has their row.
-pub(super) const FILES: [(i64, &str, &str, &[u8]); 7] = [
+/// Stored files: schema that has their row first, folder, name and content.
+pub(super) const FILES: [(i64, &str, &str, &[u8]); 9] = [
     (2, "footage/1", "video", FILM),
     (4, "libraries/13", "library.json", RESULT),
+    (4, "libraries/13", "film.mp4", RESULT),
     (4, "flocks/15", "flock.json", RESULT),
     (4, "fish/17", "video.mp4", RESULT),
     (5, "footage/2", "video", FILM),
     (12, "footage/3", "video", FILM),
     (13, "footage/4", "video", FILM),
+    (19, "views/70", "film.mp4", FILM),
 ];
 
 /// Schema and rows.
-pub(super) const ROWS: [(i64, &str); 14] = [
+pub(super) const ROWS: [(i64, &str); 15] = [
     (1, ""), // The rows of the stored files follow from FILES.
     (
         2,
@@ -55,7 +57,7 @@ pub(super) const ROWS: [(i64, &str); 14] = [
         insert into libraries (id, job_id, fence, folder, footage_id, params, summary, size_bytes, created_ms) values
             (@13, @12, 1, 'libraries/13', @1, '{}', '{\"fps\": 25.0, \"image_size_px\": [64, 48], \"view\": \"side\",
             \"n_frames\": 10, \"detected_share\": 1.0, \"n_transitions\": 1, \"component_share\": 1.0, \"clip_frames\": 4,
-            \"length_px\": null}', 2, 2002);
+            \"length_px\": null}', 4, 2002);
         insert into flocks (id, job_id, fence, folder, library_id, params, summary, size_bytes, created_ms) values
             (@15, @14, 1, 'flocks/15', @13, '{}', '{\"fps\": 25.0, \"image_size_px\": [64, 48], \"count\": 4,
             \"frames\": 24, \"seed\": 1}', 2, 3002);
@@ -119,5 +121,13 @@ pub(super) const ROWS: [(i64, &str); 14] = [
     (
         18,
         "update libraries set px_per_cm = 42.5 where id = @13;",
+    ),
+    (
+        19,
+        "insert into jobs (id, kind, state, input, result_id, after_job, priority, run_at_ms, attempt, fence, created_ms,
+            started_ms, finished_ms) values
+            (@71, 'views', 'done', '{\"library_id\": \"@uuid13\"}', @70, @12, -1, 0, 1, 1, 2002, 2003, 2004);
+        insert into views (id, job_id, fence, folder, library_id, params, summary, size_bytes, created_ms, owner, used_ms)
+            values (@70, @71, 1, 'views/70', @13, '{}', '{}', 26, 2004, 'local', 2004);",
     ),
 ];
