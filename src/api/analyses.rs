@@ -34,6 +34,18 @@ pub(super) struct AnalysisRequest {
     params: Map<String, Value>,
 }
 
+/// Parameters that a preset replaces together.
+#[derive(ToSchema)]
+#[schema(rename_all = "snake_case")]
+#[expect(
+    dead_code,
+    reason = "it only describes the presets in the OpenAPI document"
+)]
+enum Preset {
+    /// As published, as far as the two papers specify the parameters.
+    Papers,
+}
+
 /// Parameters of an analysis to override. They override the values of `preset`, or the defaults if there is no
 /// preset.
 #[derive(ToSchema)]
@@ -42,7 +54,8 @@ pub(super) struct AnalysisRequest {
     reason = "it only describes the parameters in the OpenAPI document"
 )]
 pub(super) struct AnalysisOverrides {
-    preset: Option<String>,
+    #[schema(inline)]
+    preset: Option<Preset>,
     #[serde(flatten)]
     params: Params,
 }
@@ -111,6 +124,7 @@ pub(super) async fn create_analysis(
             name: naming.name,
             owner: access.caller.account.owner.clone(),
             json_fields: &["params"],
+            film: None,
         };
         let (received, mut fields) = receive_with_json(&access.state, request, form).await?;
         let params = params::read(fields.remove("params").unwrap_or_default())?;

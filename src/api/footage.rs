@@ -16,7 +16,7 @@ use super::download::{Download, disposition};
 use super::extract::{Access, Conditions, Id, Json, Query, given};
 use super::paging::{Filtered, FootageQuery, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
-use super::receive::{label, receive};
+use super::receive::{Form, label, receive, receive_with_json};
 use super::resources::View;
 use super::timestamp::rfc3339;
 use crate::jobs::admit::ReceivedFiles;
@@ -127,7 +127,52 @@ pub(super) async fn create_footage(
         access.caller.account.owner,
     )
     .await?;
-    let (status, footage) = match admit(&access.state, received).await? {
+    stored(&access.state, received).await
+}
+
+/// The form of a variant.
+#[derive(ToSchema)]
+#[expect(
+    dead_code,
+    reason = "it only describes the form in the OpenAPI document"
+)]
+pub(super) struct VariantForm {
+    /// Picture of the scene without the animal, of the same width and height as the video.
+    #[schema(value_type = Option<String>, format = Binary)]
+    background: Option<Vec<u8>>,
+    /// One mask per frame, as for an upload.
+    #[schema(value_type = Option<String>, format = Binary)]
+    masks: Option<Vec<u8>>,
+}
+
+/// Add a background or masks to stored footage.
+///
+/// The result is new footage with the same video and the files of the form, and no others. It counts as a copy. If
+/// such footage is stored already, the response is 200 with it. Files that do not fit the video are refused with
+/// `background_size_differs` or `masks_differ`.
+#[utoipa::path(post, path = "/v1/footage/{id}/variants", params(("id" = Uuid, Path)),
+    request_body(content((VariantForm = "multipart/form-data"))),
+    responses(
+        (status = 201, body = FootageView, headers(("location" = String))),
+        (status = 200, body = FootageView, description = "the owner has already stored the same files"),
+        (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+        (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+    ))]
+pub(super) async fn create_variant(access: Access, Id(id): Id, request: Request) -> Answer {
+    let film = access.find::<Footage>(id).await?;
+    let form = Form {
+        name: Some(film.name.clone()),
+        owner: access.caller.account.owner.clone(),
+        json_fields: &[],
+        film: Some(film),
+    };
+    let (received, _no_fields) = receive_with_json(&access.state, request, form).await?;
+    stored(&access.state, received).await
+}
+
+/// Stores an upload. The response is the new footage, or the existing one with the same files.
+async fn stored(state: &AppState, received: ReceivedFiles) -> Answer {
+    let (status, footage) = match admit(state, received).await? {
         Added::New(footage) => (StatusCode::CREATED, footage),
         Added::Known(footage) => (StatusCode::OK, footage),
     };

@@ -201,6 +201,7 @@ fn table() -> OpenApiRouter<AppState> {
         ))
         .routes(routes!(footage::get_footage_file))
         .routes(routes!(footage::get_footage_poster))
+        .routes(routes!(footage::create_variant))
         .routes(routes!(uploads::describe_uploads, uploads::create_upload))
         .routes(routes!(
             uploads::head_upload,

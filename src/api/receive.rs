@@ -19,7 +19,7 @@ use super::server::is_too_slow;
 use super::{AppState, MAX_JSON_BYTES, Problem};
 use crate::jobs::admit::ReceivedFiles;
 use crate::store;
-use crate::store::footage::{BACKGROUND, MASKS, VIDEO};
+use crate::store::footage::{BACKGROUND, Footage, MASKS, VIDEO};
 use crate::store::intake::Intake;
 use crate::store::owners::Owner;
 use crate::store::space::{Announced, Counted};
@@ -53,6 +53,8 @@ pub(super) struct Form {
     pub owner: Owner,
     /// Names of the JSON fields.
     pub json_fields: &'static [&'static str],
+    /// Stored footage whose video takes the place of one in the form.
+    pub film: Option<Footage>,
 }
 
 /// Receives footage as a raw body, or as a form with `video` and optional `background` and `masks`. `name` is
@@ -67,6 +69,7 @@ pub(super) async fn receive(
         name,
         owner,
         json_fields: &[],
+        film: None,
     };
     let (received, _no_fields) = receive_with_json(state, request, form).await?;
     Ok(received)
@@ -87,6 +90,9 @@ pub(super) async fn receive_with_json(
     let draft = draft.map_err(store::Error::Io)?;
     if is_form(&request) {
         return receive_form(state, request, draft, form, announced).await;
+    }
+    if form.film.is_some() {
+        return Err(Code::UnsupportedMediaType.into());
     }
     let body = request.into_body().into_data_stream();
     let limit_bytes = state.config.max_upload_bytes;
@@ -122,7 +128,7 @@ async fn receive_form(
     let mut json_fields = JsonFields::new();
     while let Some(field) = next_field(&mut body).await? {
         match field.name() {
-            Some("video" | "footage") if video.is_none() => {
+            Some("video" | "footage") if video.is_none() && form.film.is_none() => {
                 file_name = field.file_name().map(str::to_owned);
                 let intake = Intake::create(&draft, VIDEO, limit_bytes).await?;
                 video = Some(receive_file(&mut announced, field, intake).await?);
@@ -144,6 +150,9 @@ async fn receive_form(
             }
         }
     }
+    if let Some(film) = &form.film {
+        video = Some(copy_video(state, film, &draft, &mut announced).await?);
+    }
     let received = ReceivedFiles {
         draft,
         video: video
@@ -155,6 +164,27 @@ async fn receive_form(
         counted: Counted::Body(announced),
     };
     Ok((received, json_fields))
+}
+
+/// Copies the video of stored footage into a draft.
+async fn copy_video(
+    state: &AppState,
+    film: &Footage,
+    draft: &Draft,
+    announced: &mut Announced,
+) -> Result<BlobFile, Problem> {
+    let store = &state.context.store;
+    let video = store.blob(&film.folder, VIDEO).await?;
+    let video = video.ok_or_else(Problem::not_found)?;
+    announced.receive(video.size_bytes.unsigned_abs()).await?;
+    let file = tokio::fs::File::create_new(draft.path().join(VIDEO)).await;
+    let mut file = file.map_err(store::Error::Io)?;
+    if !store.blobs().copy(&video, &film.folder, &mut file).await? {
+        let path = format!("{}/{VIDEO}", film.folder);
+        return Err(store::Error::CorruptFile(path).into());
+    }
+    file.sync_all().await.map_err(store::Error::Io)?;
+    Ok(video)
 }
 
 /// Reads a JSON field of a form, at most [`MAX_JSON_BYTES`] long.

@@ -57,6 +57,7 @@ async fn create_flock_of_film(access: &Access, mut ids: IdSequence, request: Req
         name: None,
         owner: access.caller.account.owner.clone(),
         json_fields: &["params", "analysis"],
+        film: None,
     };
     let (received, mut fields) = receive_with_json(&access.state, request, form).await?;
     let params = params::read(fields.remove("params").unwrap_or_default())?;

@@ -135,6 +135,37 @@ async fn form_without_video_or_with_unknown_fields_is_refused() {
 }
 
 #[tokio::test]
+async fn a_stored_film_gets_a_background_without_being_sent_again() {
+    let app = TestApp::idle().await;
+    let id = app.upload(&TINY).await;
+    let film = app.json(&format!("/v1/footage/{id}")).await;
+    let variants = format!("/v1/footage/{id}/variants");
+    let form = |more: u32| {
+        let side = |k: usize| film["image_size_px"][k].as_u64().unwrap() as u32;
+        let picture = flockreel_core::raster::RgbImage::new(side(0) + more, side(1));
+        let picture = flockreel_core::formats::picture::write_rgb(&picture);
+        Form::new().part("background", Part::bytes(picture))
+    };
+    let made = json_of(app.send_form(&variants, form(0)).await, StatusCode::CREATED).await;
+    assert_eq!(made["has_background"], true);
+    assert_eq!(
+        (&made["sha256"], &made["name"]),
+        (&film["sha256"], &film["name"])
+    );
+    let again = json_of(app.send_form(&variants, form(0)).await, StatusCode::OK).await;
+    assert_eq!(again["id"], made["id"]);
+    let other = app.send_form(&variants, form(2)).await;
+    assert_eq!(code_of(other, 422).await, "background_size_differs");
+    let two_films = form(0).part("video", Part::bytes(TINY.clone()));
+    let two_films = app.send_form(&variants, two_films).await;
+    assert_eq!(code_of(two_films, 400).await, "malformed_request");
+    let raw = app.post(&variants).body(TINY.clone()).send().await.unwrap();
+    assert_eq!(code_of(raw, 415).await, "unsupported_media_type");
+    assert_eq!(app.n_folders("footage").await, 2);
+    app.assert_sound().await;
+}
+
+#[tokio::test]
 async fn a_background_of_another_size_is_refused() {
     let app = TestApp::idle().await;
     let picture =

@@ -4,6 +4,9 @@
 
 use flockreel::api::signed;
 use flockreel::store::tokens::Scope;
+use flockreel_core::formats::picture::write_rgb;
+use flockreel_core::raster::RgbImage;
+use reqwest::multipart::{Form, Part};
 use reqwest::{Method, StatusCode};
 use serde_json::{Value, json};
 use uuid::Uuid;
@@ -51,6 +54,7 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("GET", "/v1/jobs/{id}/events", Path("jobs")),
         ("POST", "/v1/jobs/{id}/retry", Path("jobs")),
         ("POST", "/v1/analyses", Body("footage_id", "footage")),
+        ("POST", "/v1/footage/{id}/variants", Path("footage")),
         ("POST", "/v1/flocks", Body("library_id", "libraries")),
         (
             "POST",
@@ -120,6 +124,10 @@ async fn response_of(
     let request = app.request(method.parse::<Method>().unwrap(), &path);
     let request = match touch {
         Touch::Body(name, _) => request.json(&json!({ *name: id })),
+        Touch::Path(_) if path.ends_with("/variants") => {
+            let picture = write_rgb(&RgbImage::new(64, 64));
+            request.multipart(Form::new().part("background", Part::bytes(picture)))
+        }
         Touch::Path(_) if method == "POST" => request.json(&json!({})),
         Touch::Path("footage") if method == "PATCH" => request.json(&json!({"name": "x.mp4"})),
         Touch::Path("libraries" | "flocks" | "fish") if method == "PATCH" => {
