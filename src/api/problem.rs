@@ -5,6 +5,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
+use crate::jobs::refusal::mend::Mend;
 use crate::{jobs, store};
 use flockreel_core::code::Code;
 use flockreel_core::formats::params;
@@ -51,6 +52,10 @@ pub(super) struct ProblemBody {
     code: &'static str,
     /// Advice on what to do.
     advice: &'static str,
+    /// Changes of the request that may mend it, the most promising first. Absent if none does.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schema(required = false)]
+    mends: Vec<Mend>,
 }
 
 impl Problem {
@@ -152,6 +157,7 @@ impl IntoResponse for Problem {
             detail: self.detail,
             code: self.code.name(),
             advice: self.code.advice(),
+            mends: Mend::all_for(self.code),
         };
         let mut response = (status, axum::Json(body)).into_response();
         let headers = response.headers_mut();

@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 use super::{Error, Listener, Summary, set};
 use crate::jobs::analysis::{Advice, read_options};
 use crate::jobs::masks::Masks;
+use crate::jobs::refusal::mend::Mend;
 use crate::jobs::{refusal, views};
 use crate::media::{self, Limits, Tool, Video, read_image};
 use flockreel_core::analysis::{self, Params};
@@ -115,7 +116,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     };
     let library = analysis::analyze(source, background, &params, level, &scratch, &progress)
         .map_err(|error| {
-            show_refusal(source, &error, &args.output);
+            show_refusal(source, &error, &params, &args.output);
             Error::work(error.code(), &error)
         })?;
     let footage = footage_summary(video.files())?;
@@ -134,9 +135,14 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     Ok(Some(summary(&library, &args.output, &advice)))
 }
 
-/// Writes a picture of the frames that show why a video was refused, beside the output folder. Prints its
-/// path.
-fn show_refusal(film: &dyn FrameSource, error: &analysis::Error, output: &Path) {
+/// Prints the flags that may mend a refusal. Writes a picture of the frames that show its reason, beside the output
+/// folder, and prints its path.
+fn show_refusal(film: &dyn FrameSource, error: &analysis::Error, params: &Params, output: &Path) {
+    let mends = Mend::all_of(error, params, &film.format());
+    if !mends.is_empty() {
+        let flags: Vec<String> = mends.iter().map(flag_of).collect();
+        super::say(&format!("one of these may help: {}", flags.join(", ")));
+    }
     let Some(picture) = refusal::picture(film, error) else {
         return;
     };
@@ -150,6 +156,37 @@ fn show_refusal(film: &dyn FrameSource, error: &analysis::Error, output: &Path) 
             path.display()
         )),
         Err(cause) => super::say(&format!("cannot write {}: {cause}", path.display())),
+    }
+}
+
+/// Returns the flag that does what a mend proposes, with the placeholder of its help if nothing is proposed.
+fn flag_of(Mend { param, value }: &Mend) -> String {
+    let or = |name: &str| match value {
+        Value::Null => name.to_owned(),
+        value => value.to_string(),
+    };
+    let numbers = |value: &Value| {
+        let all = value.as_array().into_iter().flatten();
+        all.map(Value::to_string).collect::<Vec<_>>().join(",")
+    };
+    match param.as_str() {
+        "animal_at" if value.is_null() => "--animal-at FRAME:X,Y".to_owned(),
+        "animal_at" => format!(
+            "--animal-at {}:{}",
+            value["frame"],
+            numbers(&value["at_px"])
+        ),
+        "follow" => "--follow-largest".to_owned(),
+        "ignore" => match value.as_array().and_then(|boxes| boxes.last()) {
+            Some(new) => format!("--ignore {}", numbers(&new["box_px"])),
+            None => "--ignore X,Y,W,H".to_owned(),
+        },
+        "from_s" => format!("--from {}", or("SECONDS")),
+        "to_s" => format!("--to {}", or("SECONDS")),
+        "background" => "--background IMAGE".to_owned(),
+        "masks" => "--masks DIR|VIDEO".to_owned(),
+        "fps" => format!("--fps {}", or("F")),
+        name => format!("--set {name}={}", or("JSON")),
     }
 }
 
@@ -294,4 +331,52 @@ fn summary(library: &Library, output: &Path, advice: &[Advice]) -> Summary {
         "sprite_size_px": [library.sprites.width(), library.sprites.height()],
         "advice": advice,
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use flockreel_core::code::Code;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn parsed(flags: &str) -> Result<Args, clap::Error> {
+        let words = ["analyze", "film.mp4", "-o", "library"].into_iter();
+        Command::try_parse_from(words.chain(flags.split(' '))).map(|command| command.args)
+    }
+
+    #[test]
+    fn the_flag_of_a_mend_sets_its_value() {
+        let boxes = json!([{"box_px": [1, 2, 3, 4], "from_s": null, "to_s": null}]);
+        for (param, value) in [
+            ("animal_at", json!({"frame": 60, "at_px": [320.0, 240.0]})),
+            ("follow", json!("largest")),
+            ("ignore", boxes),
+            ("from_s", json!(2.5)),
+            ("to_s", json!(4.2)),
+            ("threshold", json!(9)),
+        ] {
+            let mend = Mend {
+                param: param.to_owned(),
+                value: value.clone(),
+            };
+            let args = parsed(&flag_of(&mend)).expect("the flag exists");
+            let params = params_of(&args).expect("good values");
+            assert_eq!(serde_json::to_value(params).unwrap()[param], value);
+        }
+    }
+
+    #[test]
+    fn the_flag_of_every_mend_exists() {
+        for mend in Code::ALL.iter().flat_map(|&code| Mend::all_for(code)) {
+            let flag = flag_of(&mend).replace("SECONDS", "2").replace(" F", " 30");
+            assert!(parsed(&flag).is_ok(), "{flag}");
+        }
+    }
 }

@@ -122,7 +122,7 @@ impl JobInput for Input {
         let glimpses = Glimpses::new(source, self.params.from_s, self.params.to_s);
         let film = Counted::new(&glimpses, progress);
         let library = analyze(&film, background, &self.params, level, &scratch, progress)
-            .map_err(|cause| refusal::with_picture(source, cause))?;
+            .map_err(|cause| refusal::explained(source, &self.params, cause))?;
         self.write(attempt, &library)?;
         glimpses.write_poster(&library.poses, attempt.folder())?;
         Ok(Product {

@@ -2,6 +2,7 @@
 
 use std::process::ExitStatus;
 
+use super::refusal::mend::Mend;
 use crate::{media, store};
 use flockreel_core::code::Code;
 use flockreel_core::footage::SourceError;
@@ -25,14 +26,16 @@ pub enum Error {
     /// The analysis failed.
     #[error(transparent)]
     Analysis(#[from] analysis::Error),
-    /// The analysis failed, and frames of the footage show the reason.
+    /// The analysis failed, for a reason that the footage shows or the request may mend.
     #[error("{cause}")]
     Refused {
         /// The error of the analysis.
         #[source]
         cause: analysis::Error,
         /// The frames that show the reason, JPEG.
-        picture: Vec<u8>,
+        picture: Option<Vec<u8>>,
+        /// What may mend it.
+        mends: Vec<Mend>,
     },
     /// The flock could not be made.
     #[error(transparent)]
@@ -92,6 +95,8 @@ pub struct FailedAttempt {
     pub is_transient: bool,
     /// The frames that show the reason, JPEG.
     pub picture: Option<Vec<u8>>,
+    /// What may mend it.
+    pub mends: Vec<Mend>,
 }
 
 impl Error {
@@ -123,9 +128,19 @@ impl Error {
     /// Returns the JPEG that shows the reason, if there is one.
     pub fn picture(&self) -> Option<&[u8]> {
         match self {
-            Error::Refused { picture, .. } => Some(picture),
+            Error::Refused { picture, .. } => picture.as_deref(),
             Error::Attempt(failed) => failed.picture.as_deref(),
             _ => None,
+        }
+    }
+
+    /// Returns what may mend the failure: changes of the request. Empty if nothing in the request does.
+    pub fn mends(&self) -> Vec<Mend> {
+        match self {
+            Error::Refused { mends, .. } => mends.clone(),
+            Error::Attempt(failed) => failed.mends.clone(),
+            Error::Analysis(_) => Vec::new(),
+            _ => Mend::all_for(self.code()),
         }
     }
 

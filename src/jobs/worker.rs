@@ -16,6 +16,7 @@ use super::{Context, Error, Listener, attempt, stages};
 use crate::store;
 use crate::store::Store;
 use crate::store::jobs::claim::Lane;
+use crate::store::jobs::fail::Shown;
 use crate::store::jobs::finish::Outcome;
 use crate::store::jobs::heartbeat::Beat;
 use crate::store::jobs::requeue::End;
@@ -209,8 +210,13 @@ impl Worker {
             }
             Err(error) => {
                 let code = error.code();
-                let (message, picture) = (user_message(&error), error.picture());
-                let change = store.fail(lease, code, &message, picture, now_ms()).await?;
+                let mends = serde_json::to_string(&error.mends()).ok();
+                let shown = Shown {
+                    picture: error.picture(),
+                    mends: mends.as_deref(),
+                };
+                let message = user_message(&error);
+                let change = store.fail(lease, code, &message, shown, now_ms()).await?;
                 (change, Step::Failed(job, code))
             }
         };

@@ -55,10 +55,10 @@ codes! {
         "Send only the video stream, for example with `ffmpeg -i film -an -sn -dn -c:v libx264 -crf 16 film-alone.mp4`."
     TooLong "too_long" "The footage lasts longer than the limit."
         "Send a part of the film, for example with `ffmpeg -i film -an -t 600 -c:v libx264 -crf 16 piece.mp4`. To \
-         measure a whole time lapse, set a higher rate, for example with `--fps 30`."
+         measure a whole time lapse, set a higher frame rate, such as 30."
     TooFast "too_fast" "The frame rate is above the limit."
         "Reduce the frame rate, for example with `ffmpeg -i film -an -r 60 -c:v libx264 -crf 16 slower.mp4`, or set \
-         the true rate, for example with `--fps 240`."
+         the true frame rate, such as 240."
     Truncated "truncated" "The file is incomplete or damaged."
         "Copy the file from the camera again. If no complete copy exists, the message of the error says what else helps: \
          it depends on the missing part."
@@ -84,31 +84,30 @@ codes! {
     // Analysis (docs/explanation/algorithms.md, "Refused footage").
     NothingMoves "nothing_moves" "No moving animal was found in the film."
         "Film an animal that moves and that differs from the background in color or brightness. Or send a picture of \
-         the empty scene, for example with `--background empty.png`."
+         the empty scene, or lower the threshold."
     NothingAtPoint "nothing_at_point" "No moving object was found at the point `animal_at`."
         "Choose a frame in which the animal has moved, and a point on the animal. Frames count from 0, as in \
          poses.json."
     MasksDiffer "masks_differ" "The masks do not match the footage in size or number."
         "Send one mask per frame, with the width and height of the footage. If the frame rate of the footage varies, \
-         set a rate, for example with `--fps 30`; each picture is then used once."
+         set a rate, such as 30; each picture is then used once."
     MasksEmpty "masks_empty" "The masks show no animal."
         "Send masks that are white on the animal and black elsewhere."
     BackgroundNotStatic "background_not_static" "Large parts of the picture change during the whole film."
-        "Use a tripod, fix zoom and focus, and film a still scene. Exclude a moving part of the picture, for example \
-         with `--ignore 0,0,200,100`, or measure a steady part of the film, for example with `--from 2 --to 20`."
+        "Use a tripod, fix zoom and focus, and film a still scene. Or ignore the part of the picture that moves, or \
+         measure a steady part of the film."
     CameraMoved "camera_moved" "The camera moved too often: it kept no position for long enough."
-        "Measure a part of the film with a still camera, for example with `--from 2 --to 20`, or film again with the \
-         camera fixed."
+        "Measure a part of the film with a still camera, or film again with the camera fixed."
     LightChanges "light_changes" "The light changes too often or too strongly to be corrected."
-        "Measure a part with steady light, for example with `--from 2 --to 20`, or film in steady light. Set the \
+        "Measure a part with steady light, or film in steady light. Set the \
          anti-flicker mode of the camera to the mains frequency, 50 or 60 Hz."
     SceneChanges "scene_changes" "The film shows several scenes, none of them for long enough."
-        "Measure only the scene that shows the animal, for example with `--from 2 --to 20`."
+        "Measure only the scene that shows the animal."
     AnimalTooLarge "animal_too_large" "The animal fills too much of the picture."
-        "Step back, or zoom out, until the animal covers less than 15 % of the picture."
+        "Step back, or zoom out, until the animal covers less than 15 % of the picture. Or send masks of the animal."
     SeveralAnimals "several_animals" "More than one animal moves in the footage."
-        "Film a single animal, without its mirror image. Or choose the animal by frame and point, for example with \
-         `--animal-at 60:320,240` (frame, x, y), or follow the largest with `--follow-largest`."
+        "Film a single animal, without its mirror image. Or point at the animal in one frame, or follow the \
+         largest."
     AnimalTooSmall "animal_too_small" "The animal is too small in the picture."
         "Film from a shorter distance, or at a higher resolution."
     BackgroundSizeDiffers "background_size_differs" "The size of the background image differs from that of the footage."
@@ -147,7 +146,7 @@ codes! {
     UnsupportedMediaType "unsupported_media_type" "The media type of the body is not supported at this address."
         "Set `Content-Type` as in the API reference, and send no `Content-Encoding`."
     TooLarge "too_large" "The body is larger than the limit."
-        "Send a smaller body. The limit for films is the service's `--max-upload-bytes`."
+        "Send a smaller body. The operator of the service sets the limit for films."
     HeadTooLarge "head_too_large" "The header of the request exceeds the limit."
         "Send fewer or shorter header fields. The limit is 32 KiB in total."
     AddressTooLong "address_too_long" "The address is longer than the limit."

@@ -9,6 +9,7 @@ use axum::body::Body;
 use axum::http::{HeaderMap, Response, StatusCode, header};
 use axum::response::IntoResponse;
 use serde::Serialize;
+use serde_json::Value;
 use utoipa::ToSchema;
 use uuid::Uuid;
 
@@ -20,10 +21,12 @@ use super::timestamp::rfc3339;
 
 use crate::jobs::clock::now_ms;
 use crate::jobs::refusal::FILE_NAME;
+use crate::jobs::refusal::mend::Mend;
 use crate::store::jobs::cancel::Cancel;
-use crate::store::jobs::read::JobRow;
+use crate::store::jobs::read::{Failure, JobRow};
 use crate::store::jobs::{JobState, Kind};
 use crate::store::resources::Library;
+use flockreel_core::analysis::Params;
 use flockreel_core::code::Code;
 use flockreel_core::ids::{JobId, LibraryId};
 
@@ -83,6 +86,11 @@ pub(super) struct JobFailure {
     advice: &'static str,
     /// Address of a picture of the frames that show the reason; null if there is none.
     picture: Option<String>,
+    /// Changes of the request that may mend it, the most promising first. Empty if none does.
+    mends: Vec<Mend>,
+    /// Parameters of the analysis that failed, of which `mends` proposes changes; null for other jobs.
+    #[schema(value_type = Option<Params>)]
+    params: Option<Value>,
 }
 
 /// Addresses of a job and its result.
@@ -258,6 +266,13 @@ fn subject(row: &JobRow) -> Option<JobSubject> {
     row.subject_id().map(|id| JobSubject { kind, id })
 }
 
+/// Returns what may mend a failure. Older versions stored nothing of it.
+fn mends_of(failure: &Failure) -> Vec<Mend> {
+    let stored = failure.mends.as_deref();
+    let stored = stored.and_then(|json| serde_json::from_str(json).ok());
+    stored.unwrap_or_else(|| Mend::all_for(failure.code))
+}
+
 fn is_final(job: &JobView) -> bool {
     job.finished_at.is_some()
 }
@@ -277,6 +292,9 @@ impl From<JobRow> for JobView {
                 picture: row.has_picture.then(|| format!("{path}/{FILE_NAME}")),
                 code: failure.code.name(),
                 title: failure.code.meaning(),
+                mends: mends_of(&failure),
+                params: (failure.params.as_deref())
+                    .and_then(|json| serde_json::from_str(json).ok()),
                 detail: failure.detail,
                 advice: failure.code.advice(),
             }),

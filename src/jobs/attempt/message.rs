@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::jobs::Error;
+use crate::jobs::refusal::mend::Mend;
 use crate::media::FoundTools;
 use crate::store::BlobFile;
 use flockreel_core::formats::library_json::FootageSummary;
@@ -110,6 +111,8 @@ pub(super) struct Failure {
     pub(super) sentence: String,
     /// Whether another attempt may succeed.
     pub(super) is_transient: bool,
+    /// What may mend it.
+    pub(super) mends: Vec<Mend>,
 }
 
 impl From<&Error> for Failure {
@@ -118,6 +121,7 @@ impl From<&Error> for Failure {
             code: error.code().name().to_owned(),
             sentence: error.to_string(),
             is_transient: error.is_transient(),
+            mends: error.mends(),
         }
     }
 }

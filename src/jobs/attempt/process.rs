@@ -298,6 +298,7 @@ fn failed(failure: Failure, draft: &Draft) -> FailedAttempt {
         code: Code::from_name(&failure.code).unwrap_or(Code::Internal),
         sentence: failure.sentence,
         is_transient: failure.is_transient,
+        mends: failure.mends,
         picture: std::fs::read(draft.path().join(refusal::FILE_NAME)).ok(),
     }
 }

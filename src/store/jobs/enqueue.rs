@@ -210,6 +210,7 @@ mod tests {
     use super::*;
     use crate::store::fresh;
     use crate::store::jobs::Change;
+    use crate::store::jobs::fail::Shown;
     use crate::store::owners::OwnerFilter;
     use flockreel_core::code::Code;
 
@@ -244,7 +245,7 @@ mod tests {
         assert_eq!(waiting, (JobState::Queued, None));
         let lease = store.claim(Uuid::now_v7(), 1, 10).await.unwrap().unwrap();
         let sentence = "it is no film";
-        let fail = store.fail(&lease, Code::NotAVideo, sentence, None, 2);
+        let fail = store.fail(&lease, Code::NotAVideo, sentence, Shown::default(), 2);
         assert_eq!(fail.await.unwrap(), Change::Made);
         let late = state_after(&failed).await;
         assert_eq!(late, (JobState::Failed, Some(Code::InputFailed)));

@@ -5,30 +5,39 @@ use super::{Change, Lease};
 use crate::store::{Error, Store, sql};
 use flockreel_core::code::Code;
 
+/// What explains a failure besides its code and description.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Shown<'a> {
+    /// Frames that show the reason, JPEG.
+    pub picture: Option<&'a [u8]>,
+    /// What may mend it, JSON.
+    pub mends: Option<&'a str>,
+}
+
 impl Store {
-    /// Ends the job as failed, for an error that another attempt would repeat. `picture` is a JPEG that shows
-    /// the reason.
+    /// Ends the job as failed, for an error that another attempt would repeat.
     pub async fn fail(
         &self,
         lease: &Lease,
         code: Code,
         detail: &str,
-        picture: Option<&[u8]>,
+        shown: Shown<'_>,
         now_ms: i64,
     ) -> Result<Change, Error> {
         let fail = || async {
             let mut transaction = self.writer.begin().await?;
             let n_rows = sql::query(
                 "update jobs set state = 'failed', worker = null, lease_until_ms = null, stage = null, \
-                 code = $3, detail = $4, refused_jpeg = $5, finished_ms = $6 \
+                 code = $3, detail = $4, refused_jpeg = $5, finished_ms = $6, mends = $7 \
                  where id = $1 and fence = $2 and state = 'running'",
             )
             .bind(lease.job_id.0)
             .bind(lease.fence)
             .bind(code.name())
             .bind(detail)
-            .bind(picture)
+            .bind(shown.picture)
             .bind(now_ms)
+            .bind(shown.mends)
             .execute(&mut transaction)
             .await?;
             if Change::from_rows(n_rows) == Change::Made {

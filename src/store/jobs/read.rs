@@ -11,10 +11,11 @@ use flockreel_core::ids::JobId;
 
 /// Statement that selects the jobs of all owners as [`JobRow`]s. The table has the alias `r`.
 pub(super) const SELECT: &str = "select id, kind, state, result_id, cancel_requested, attempt, stage, \
-    progress, code, detail, created_ms, started_ms, finished_ms, refused_jpeg is not null as has_picture, \
+    progress, code, detail, mends, created_ms, started_ms, finished_ms, refused_jpeg is not null as has_picture, \
     (select b.state from jobs b where b.id = r.after_job) as state_before, \
     case kind when 'sample' then null when 'analysis' then json_extract(input, '$.footage_id') \
-    else json_extract(input, '$.library_id') end as subject from jobs r";
+    else json_extract(input, '$.library_id') end as subject, \
+    case when kind = 'analysis' and state = 'failed' then json_extract(input, '$.params') end as params from jobs r";
 
 /// One job as shown to users.
 #[derive(Clone, Debug, PartialEq, sqlx::FromRow)]
@@ -41,6 +42,8 @@ pub struct JobRow {
     pub progress: f64,
     code: Option<String>,
     detail: Option<String>,
+    mends: Option<String>,
+    params: Option<String>,
     state_before: Option<String>,
     /// Whether a picture shows the reason of the failure.
     pub has_picture: bool,
@@ -59,6 +62,10 @@ pub struct Failure {
     pub code: Code,
     /// Description of this failure.
     pub detail: String,
+    /// What may mend it, JSON. `None` if it was not stored.
+    pub mends: Option<String>,
+    /// Parameters of a failed analysis, JSON.
+    pub params: Option<String>,
 }
 
 impl JobRow {
@@ -73,6 +80,8 @@ impl JobRow {
         Some(Failure {
             code: Code::from_name(code).unwrap_or(Code::Internal),
             detail: self.detail.clone().unwrap_or_default(),
+            mends: self.mends.clone(),
+            params: self.params.clone(),
         })
     }
 }

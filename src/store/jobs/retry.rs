@@ -106,7 +106,7 @@ impl Store {
             "with recursive family (id) as ( \
                  select id from jobs where id = $1 \
                  union select j.id from jobs j join family f on j.after_job = f.id) \
-             update jobs set state = 'queued', code = null, detail = null, refused_jpeg = null, \
+             update jobs set state = 'queued', code = null, detail = null, refused_jpeg = null, mends = null, \
              finished_ms = null, run_at_ms = $2, cancel_requested = false, progress = 0, \
              own_crashes = 0, lone_crashes = 0, transient_ends = 0 \
              where id in (select id from family) and state in ('failed', 'cancelled') and (id = $1 \

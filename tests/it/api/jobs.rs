@@ -37,6 +37,8 @@ async fn refused_film_has_a_picture_of_the_reason() {
     let accepted = app.accept("/v1/analyses", body).await;
     let job = app.ended_job(&accepted["job_id"]).await;
     assert_eq!(job["error"]["code"], "background_not_static", "{job}");
+    assert_eq!(job["error"]["mends"][0]["param"], "ignore", "{job}");
+    assert_eq!(job["error"]["params"]["threshold"], 18, "{job}");
     let picture = job["error"]["picture"].as_str().expect("a picture");
     let answer = app.get(picture).send().await.unwrap();
     assert_eq!(answer.headers()["content-type"], "image/jpeg");

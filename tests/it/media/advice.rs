@@ -47,11 +47,17 @@ fn said(code: Code, sentence: &str) -> String {
     format!("{sentence} {} {}", code.advice(), rows_about(code))
 }
 
-/// Returns the values of `--fps` in the advice of a code.
+/// Returns the frame rates that the advice of a code proposes.
 fn rates(code: Code) -> Vec<f64> {
-    let quoted = code.advice().split('`').skip(1).step_by(2);
-    let rates = quoted.filter_map(|text| text.strip_prefix("--fps "));
-    rates.map(|fps| fps.parse().expect("a number")).collect()
+    let proposed = code.advice().split("rate, such as ").skip(1);
+    let digits = |text: &str| {
+        text.split(|c: char| !c.is_ascii_digit())
+            .next()
+            .map(str::parse)
+    };
+    proposed
+        .map(|text| digits(text).expect("a word").expect("a number"))
+        .collect()
 }
 
 /// Films that are refused: code, picture size, number of frames, ffmpeg arguments. Each code whose advice

@@ -9,6 +9,7 @@ use tempfile::TempDir;
 
 use super::cancel::Cancel;
 use super::enqueue::NewJob;
+use super::fail::Shown;
 use super::finish::{Outcome, Source};
 use super::heartbeat::Beat;
 use super::read::JobRow;
@@ -184,7 +185,10 @@ async fn worker_with_an_old_fence_changes_nothing() {
     let fresh = queue.claim(LEASE_MS + 1).await.unwrap();
 
     assert_eq!(queue.finish(&stale).await, Change::Lost);
-    let failed = queue.store.fail(&stale, Code::Internal, "", None, 0).await;
+    let failed = queue
+        .store
+        .fail(&stale, Code::Internal, "", Shown::default(), 0)
+        .await;
     assert_eq!(failed.unwrap(), Change::Lost);
     assert_eq!(queue.store.stop(&stale, 0).await.unwrap(), Change::Lost);
     let requeued = queue.store.requeue(&stale, End::Crash, 0).await;
@@ -300,7 +304,7 @@ async fn follower_of_a_failed_job_fails() {
     let lease = queue.claim(0).await.unwrap();
     let failed = queue
         .store
-        .fail(&lease, Code::NothingMoves, "still", None, 1);
+        .fail(&lease, Code::NothingMoves, "still", Shown::default(), 1);
     assert_eq!(failed.await.unwrap(), Change::Made);
     let row = queue
         .store
@@ -330,7 +334,9 @@ async fn ended_job_has_no_stage() {
     assert_eq!(queue.finish(&done).await, Change::Made);
     assert_eq!(stage(&done).await, None);
     let failed = running().await;
-    let failure = queue.store.fail(&failed, Code::Internal, "", None, 1);
+    let failure = queue
+        .store
+        .fail(&failed, Code::Internal, "", Shown::default(), 1);
     assert_eq!(failure.await.unwrap(), Change::Made);
     assert_eq!(stage(&failed).await, None, "failed");
     let stopped = running().await;

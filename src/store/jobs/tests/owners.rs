@@ -1,6 +1,7 @@
 //! Tests of the queue with several owners: the fair queue, small jobs and quotas (docs/explanation/promises.md, "Fair queue").
 
 use super::claim::Lane;
+use super::fail::Shown;
 use super::*;
 
 fn of(owner: &str, quota: i64) -> Account {
@@ -90,9 +91,13 @@ impl Queue {
     /// Claims and ends the next job.
     async fn run_next(&self, now_ms: i64) -> JobId {
         let lease = self.claim(now_ms).await.unwrap();
-        let end = self
-            .store
-            .fail(&lease, Code::NotAVideo, "it is no film", None, now_ms);
+        let end = self.store.fail(
+            &lease,
+            Code::NotAVideo,
+            "it is no film",
+            Shown::default(),
+            now_ms,
+        );
         assert_eq!(end.await.unwrap(), Change::Made);
         lease.job_id
     }

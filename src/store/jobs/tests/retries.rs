@@ -1,5 +1,6 @@
 //! Tests of retries by users: which jobs return to the queue, and with which others.
 
+use super::fail::Shown;
 use super::retry::{Refusal, Retry};
 use super::*;
 
@@ -11,7 +12,11 @@ impl Queue {
     }
 
     async fn fail(&self, lease: &Lease, code: Code) {
-        let failed = self.store.fail(lease, code, "why", Some(b"jpeg"), 5).await;
+        let shown = Shown {
+            picture: Some(b"jpeg"),
+            mends: Some("[]"),
+        };
+        let failed = self.store.fail(lease, code, "why", shown, 5).await;
         assert_eq!(failed.unwrap(), Change::Made);
     }
 }

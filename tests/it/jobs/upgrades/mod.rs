@@ -201,6 +201,10 @@ async fn assert_results_are_served(app: &TestApp, schema: i64) {
         let answer = app.get(&path).send().await.unwrap();
         assert_eq!(answer.bytes().await.unwrap(), JPEG);
     }
+    if schema >= 20 {
+        let job = app.json(&format!("/v1/jobs/{}", id(21))).await;
+        assert_eq!(job["error"]["mends"], json!([]), "{job}");
+    }
 }
 
 /// Rows before owners belong to local requests. Tokens and sessions give access to the things of their owner only.

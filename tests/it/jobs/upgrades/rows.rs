@@ -28,7 +28,7 @@ pub(super) const FILES: [(i64, &str, &str, &[u8]); 9] = [
 ];
 
 /// Schema and rows.
-pub(super) const ROWS: [(i64, &str); 15] = [
+pub(super) const ROWS: [(i64, &str); 16] = [
     (1, ""), // The rows of the stored files follow from FILES.
     (
         2,
@@ -129,5 +129,9 @@ pub(super) const ROWS: [(i64, &str); 15] = [
             (@71, 'views', 'done', '{\"library_id\": \"@uuid13\"}', @70, @12, -1, 0, 1, 1, 2002, 2003, 2004);
         insert into views (id, job_id, fence, folder, library_id, params, summary, size_bytes, created_ms, owner, used_ms)
             values (@70, @71, 1, 'views/70', @13, '{}', '{}', 26, 2004, 'local', 2004);",
+    ),
+    (
+        20,
+        "update jobs set mends = '[]' where id = @21;",
     ),
 ];

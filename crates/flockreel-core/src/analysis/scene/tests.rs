@@ -216,7 +216,6 @@ fn two_animals_are_refused_unless_the_largest_is_followed() {
     let two = |k: usize| Picture::with_discs(vec![swimmer(k, 0.0, 10.0), swimmer(k, 3.1, 8.0)]);
     let (code, sentence) = refusal(60, two);
     assert_eq!(code, Code::SeveralAnimals, "{sentence}");
-    assert!(code.advice().contains("--follow-largest"));
     let params = Params {
         follow: Follow::Largest,
         ..Params::default()

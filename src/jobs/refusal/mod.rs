@@ -1,8 +1,11 @@
-//! `refused.jpg`: frames of the footage that show why it was refused
+//! Refused footage: what may mend it, and `refused.jpg`, frames of the footage that show the reason
 //! (docs/explanation/algorithms.md, "Refused footage").
 
+pub mod mend; // parameters that may mend it
+
+use self::mend::Mend;
 use super::Error;
-use flockreel_core::analysis;
+use flockreel_core::analysis::{self, Params};
 use flockreel_core::footage::{FrameSource, SourceError};
 use flockreel_core::formats::evidence;
 use flockreel_core::raster::Frame;
@@ -10,11 +13,17 @@ use flockreel_core::raster::Frame;
 /// File name of the picture, also in URLs.
 pub const FILE_NAME: &str = "refused.jpg";
 
-/// Returns the error of an analysis, with a picture if the footage shows the reason.
-pub fn with_picture(source: &dyn FrameSource, cause: analysis::Error) -> Error {
-    match picture(source, &cause) {
-        Some(picture) => Error::Refused { cause, picture },
-        None => Error::Analysis(cause),
+/// Returns the error of an analysis with what may mend it, and with a picture if the footage shows the reason.
+pub fn explained(source: &dyn FrameSource, params: &Params, cause: analysis::Error) -> Error {
+    let mends = Mend::all_of(&cause, params, &source.format());
+    let picture = picture(source, &cause);
+    if picture.is_none() && mends.is_empty() {
+        return Error::Analysis(cause);
+    }
+    Error::Refused {
+        cause,
+        picture,
+        mends,
     }
 }
 
