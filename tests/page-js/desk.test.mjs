@@ -1,6 +1,5 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { changedParams } from "../../static/js/desk/remeasure-params.js";
 import { append, derive, emptyColumns, fillTailBeat, firstFrame, frameAt, headOf } from "../../static/js/desk/columns.js";
 import { gapsOf } from "../../static/js/desk/gaps.js";
 import { svgPen, thinned, trace } from "../../static/js/desk/lines.js";
@@ -86,16 +85,6 @@ test("missing headings are found across the border of the compass", () => {
   assert.deepEqual(gapsOf(bins), [[34, 4]]);
   assert.deepEqual(gapsOf(Array(36).fill(2)), []);
   assert.deepEqual(gapsOf(Array(36).fill(0)), [[0, 36]]);
-});
-
-test("only changed settings are sent, and settings of the former measurement stay", () => {
-  const defaults = { view: null, follow: "one", threshold: 18, ignore: [] };
-  const send = (former, change, preset = "") => changedParams({ draft: { ...former, ...change }, former, defaults, preset });
-  assert.deepEqual(send(defaults, {}), {});
-  assert.deepEqual(send(defaults, { follow: "largest" }), { follow: "largest" });
-  assert.deepEqual(send({ ...defaults, threshold: 10 }, { view: "top" }), { threshold: 10, view: "top" });
-  assert.deepEqual(send({ ...defaults, threshold: 10 }, { threshold: 18 }), {});
-  assert.deepEqual(send({ ...defaults, gone: 1 }, { ignore: [{ box_px: [1, 2, 3, 4] }] }, "papers"), { preset: "papers", ignore: [{ box_px: [1, 2, 3, 4] }] });
 });
 
 test("the weakest moments are apart and say why", () => {

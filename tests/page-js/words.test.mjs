@@ -9,7 +9,11 @@ import { grouped } from "../../static/js/studio/groups.js";
 
 const STATIC = new URL("../../static/", import.meta.url);
 /** Japanese words without a Japanese letter: names, numbers, units and marks. */
-const UNTRANSLATED = ["foot.api", "upload.of", "thing.weight.none", "thing.flee_bl.none", "set.format.gif", "set.format.webp", "share.curl", "share.python", "unit.cm", "unit.m", "desk.of_frames", "desk.compass.share"];
+const UNTRANSLATED = ["foot.api", "upload.of", "thing.weight.none", "thing.flee_bl.none", "set.format.gif", "set.format.webp", "share.curl", "share.python", "unit.cm", "unit.m", "desk.of_frames", "desk.compass.share", "editor.does.one", "editor.does.and"];
+
+/** Settings of an analysis that are below "More", and those in sight. */
+const ANALYSIS = ["view", "follow", "threshold", "sprites", "kappa", "fps", "pixel_aspect", "camera.z_min_m", "camera.pane_px_per_m", "camera.center_px", "camera.medium_index", "animal.length_m", "animal.height_m",
+  "scale_mode", "smooth", "clip_frames", "clip_weights", "epsilon", "heading_gate_deg", "planes", "eq7", "axis_and_head"];
 
 const files = readdirSync(STATIC, { recursive: true, withFileTypes: true })
   .filter((file) => file.isFile() && /\.(js|html)$/.test(file.name) && !file.parentPath.endsWith("words"))
@@ -105,7 +109,7 @@ test("Japanese words exist for reasons to refuse and for the help of settings", 
   const told = Object.keys(service).filter((key) => key.startsWith("code."));
   assert.ok(told.length >= 60);
   assert.deepEqual(told.filter((key) => !codes.includes(key.split(".")[1]) || !(key.replace(/^(code\.\w+)$/, "$1.advice") in service)), []);
-  const settings = [...Object.values(grouped({ has: () => true, values: () => [] })).flat(), "palette", "swim", "bank_rad", "smooth_s", "bridge_s", "length_m", "height_m"];
+  const settings = [...Object.values(grouped({ has: () => true, values: () => [] })).flat(), "palette", "swim", "bank_rad", "smooth_s", "bridge_s", "length_m", "height_m", ...ANALYSIS];
   assert.ok(settings.length > 40);
   assert.deepEqual(settings.filter((name) => Number(`hint.${name}` in ja) + Number(`hint.${name}` in service) !== 1), []);
 });

@@ -58,11 +58,11 @@ def test_no_violations(visitor, filled_service, name, locale):
     assert found == {}
 
 
-@pytest.mark.parametrize("state", ["tray", "details", "dialog"])
+@pytest.mark.parametrize("state", ["tray", "details", "desk editor", "film editor"])
 def test_no_violations_in_what_opens(visitor, filled_service, state):
     page = visitor(reduced_motion="reduce")
     addresses = dict(zip(NAMES, places(filled_service), strict=True))
-    name = {"tray": "films", "details": "studio", "dialog": "desk"}[state]
+    name = {"tray": "films", "details": "studio", "desk editor": "desk", "film editor": "film"}[state]
     page.goto(addresses[name])
     is_ready(page, name)
     if state == "tray":
@@ -70,10 +70,13 @@ def test_no_violations_in_what_opens(visitor, filled_service, state):
     elif state == "details":
         page.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
     else:
-        page.locator("#measure-again").click()
-    for theme in ("light", "dark"):
-        page.emulate_media(color_scheme=theme, reduced_motion="reduce")
-        assert violations(page) == []
+        page.locator("#measure-again, #change-settings").click()
+        page.locator(".editor summary").click()
+    for viewport in SIZES.values():
+        page.set_viewport_size(viewport)
+        for theme in ("light", "dark"):
+            page.emulate_media(color_scheme=theme, reduced_motion="reduce")
+            assert violations(page) == []
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

@@ -140,8 +140,8 @@ def test_patches_lead_from_one_to_the_next(page, library):
 def test_view_guess_is_mended_with_one_click(page, library):
     open_desk(page, library[0])
     page.get_by_role("button", name="No, from above").click()
-    expect(page.locator(".remeasure select[name=view]")).to_have_value("top")
-    expect(page.locator(".remeasure-foot")).to_contain_text("Changed: Filmed")
+    expect(page.locator(".editor").get_by_label("Filmed", exact=True)).to_have_value("top")
+    expect(page.locator(".editor-foot")).to_contain_text("Filmed: from above")
 
 
 def test_other_mover_is_ignored_in_its_place_and_time(page, library):
@@ -155,7 +155,7 @@ def test_other_mover_is_ignored_in_its_place_and_time(page, library):
     expect(card).to_contain_text("Something moves but stays in its place, from 1.0 to 2.5 s")
     card.get_by_role("button", name="Ignore it").click()
     page.get_by_role("button", name="Measure", exact=True).click()
-    until(page, "document.querySelector('.remeasure .problem') !== null")
+    until(page, "document.querySelector('.editor .problem') !== null")
     assert sent[0]["params"]["ignore"] == [{key: mover[key] for key in ("box_px", "from_s", "to_s")}]
 
 
@@ -274,12 +274,12 @@ def test_measuring_again_sends_only_changed_settings(page, library):
     page.route("**/v1/analyses", answer)
     open_desk(page, library[0])
     page.get_by_role("button", name="Measure again").click()
-    page.get_by_label("When several animals move").select_option("largest")
-    picture = page.locator(".remeasure-picture")
+    page.get_by_label("When several animals move", exact=True).select_option("largest")
+    picture = page.locator(".editor-picture")
     picture.click(position={"x": 60, "y": 50})
-    expect(page.locator(".remeasure-marks li")).to_contain_text("in frame 0")
+    expect(page.locator(".editor-marks li")).to_contain_text("in frame 0")
     page.get_by_role("button", name="Measure", exact=True).click()
-    expect(page.locator(".remeasure .problem")).to_contain_text("Several animals move.")
+    expect(page.locator(".editor .problem")).to_contain_text("Several animals move.")
     assert set(sent[0]["params"]) == {"follow", "animal_at"}
     assert sent[0]["params"]["animal_at"]["frame"] == 0
 

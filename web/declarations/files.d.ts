@@ -119,6 +119,7 @@ declare namespace Api {
     allOf?: JsonSchema[];
     properties?: Record<string, JsonSchema>;
     items?: JsonSchema;
+    minItems?: number;
     enum?: (string | null)[];
     default?: unknown;
     description?: string;

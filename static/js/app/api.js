@@ -4,7 +4,7 @@ import { say } from "./words.js";
 
 /** An error as a problem document of the service (RFC 9457). */
 export class Problem extends Error {
-  /** @param {Partial<Api.Schemas["ProblemBody"]> & {picture?: string | null}} body */
+  /** @param {Partial<Api.Schemas["ProblemBody"]> & Partial<Pick<Api.Schemas["JobFailure"], "picture" | "params">>} body */
   constructor(body) {
     super(body.title ?? say("problem.title"));
     this.title = this.message;
@@ -12,6 +12,8 @@ export class Problem extends Error {
     this.code = body.code ?? "";
     this.advice = body.advice ?? "";
     this.picture = body.picture ?? null;
+    this.mends = body.mends ?? [];
+    this.params = body.params ?? null;
     this.status = body.status ?? 0;
   }
 }
@@ -38,12 +40,13 @@ export function problemFrom(text, status) {
 /**
  * Sends a request and returns the response, or throws a Problem.
  * @param {string} method @param {string} path
- * @param {{body?: unknown, accept?: string, signal?: AbortSignal, headers?: Record<string, string>}} [options] the body is sent as JSON
+ * @param {{body?: unknown, accept?: string, signal?: AbortSignal, headers?: Record<string, string>}} [options] the body is sent as JSON, or as the form that it is
  */
 export async function request(method, path, { body, accept, signal, headers = {} } = {}) {
-  if (body !== undefined) headers = { "Content-Type": "application/json", ...headers };
+  const isForm = body instanceof FormData;
+  if (body !== undefined && !isForm) headers = { "Content-Type": "application/json", ...headers };
   if (accept) headers = { Accept: accept, ...headers };
-  const response = await fetch(path, { method, headers, signal, body: body === undefined ? undefined : JSON.stringify(body) })
+  const response = await fetch(path, { method, headers, signal, body: body === undefined || isForm ? body : JSON.stringify(body) })
     .catch((error) => { throw error.name === "AbortError" ? error : unreachable(); });
   if (!response.ok) throw problemFrom(await response.text(), response.status);
   return response;

@@ -28,7 +28,7 @@ const ROUTES = [
 ];
 
 /** Style sheets of the places that are instruments, in the order of the cascade. The others use those of index.html. */
-const STYLES = ["form", "timeline", "studio", "reel", "desk", "fish"];
+const STYLES = ["form", "timeline", "studio", "reel", "desk", "fish", "editor"];
 const PLAIN = ["home", "films", "film", "jobs", "missing"];
 
 let leaving = new AbortController();

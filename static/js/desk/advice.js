@@ -11,9 +11,9 @@ import { pictureOf } from "./advice-picture.js";
  * @type {Record<string, {name: string, params?: Api.AnalysisChanges, tool?: string, tab?: string}>}
  */
 const MENDS = {
-  several_animals: { name: "point", tool: "animal" },
-  foreign_frames: { name: "part", tool: "part" },
-  seldom_found: { name: "point", tool: "animal" },
+  several_animals: { name: "point", tool: "animal_at" },
+  foreign_frames: { name: "part", tool: "from_s" },
+  seldom_found: { name: "point", tool: "animal_at" },
   little_playback: { name: "looser", params: { kappa: 3 } },
   no_transitions: { name: "looser", params: { kappa: 3 } },
   few_jumps: { name: "looser", params: { kappa: 3 } },
@@ -49,7 +49,7 @@ const card = (kind, picture, sentence, buttons) => element("li.advice", { classN
 function adviceCard(desk, { code, sentence }, { pictures, shoot, acts }) {
   // A compass shows headings, not turns.
   const mend = /^lacks_.*(turn|straight)$/.test(code) ? MENDS.few_jumps : code.startsWith("lacks_") ? { name: "compass", tab: "pose" } : MENDS[code];
-  const act = () => (mend.tab ? acts.showTab(mend.tab) : acts.remeasure(mend.tool, mend.params));
+  const act = () => (mend.tab ? acts.showTab(mend.tab) : acts.remeasure(mend.tool ?? Object.keys(mend.params ?? {})[0], mend.params));
   return card("is-advice", pictureOf(code, { desk, pictures, shoot }), sentenceOf(desk, code, sentence), mend ? [{ name: mend.name, act }] : []);
 }
 
@@ -71,7 +71,7 @@ function viewCard(desk, shoot, { remeasure }) {
   for (let k = desk.first; k <= desk.last() && k < columns.n; k++) if (columns.detected[k] && !columns.cut[k] && !(columns.length_px[k] <= columns.length_px[best])) best = k;
   const picture = shoot({ frame: best, label: say("desk.view.label", { view }), hasMarks: true, around_px: columns.detected[best] ? [...columns.box_px.subarray(4 * best, 4 * best + 4)] : undefined });
   const sentence = sure === undefined ? say("desk.view.given", { view }) : say("desk.view.guess", { view, share: percent(sure) });
-  return card(sure !== undefined && sure < 0.9 ? "is-advice" : "is-fact", picture, sentence, [{ name: other, act: () => remeasure("", { view: other }) }]);
+  return card(sure !== undefined && sure < 0.9 ? "is-advice" : "is-fact", picture, sentence, [{ name: other, act: () => remeasure("view", { view: other }) }]);
 }
 
 /** One thing that moves besides the animal. @param {import("./instrument.js").Instrument} desk @param {Api.Mover} mover @param {import("./shots.js").Shoot} shoot @param {Acts} acts */
@@ -83,7 +83,7 @@ function moverCard(desk, { kind, from_s, to_s, box_px }, shoot, { remeasure }) {
   const ignored = [...(desk.library.params?.ignore ?? []), { box_px, from_s, to_s }];
   return card("is-mover", shoot({ frame, label: sentence, box_px, hasMarks: true }), sentence, [
     { name: "ignore_this", act: () => remeasure("ignore", { ignore: ignored }) },
-    { name: "this_one", act: () => { desk.goTo(frame); remeasure("animal", { animal_at: { frame, at_px: [x + w / 2, y + h / 2] } }); } },
+    { name: "this_one", act: () => { desk.goTo(frame); remeasure("animal_at", { animal_at: { frame, at_px: [x + w / 2, y + h / 2] } }); } },
     { name: "see_it", act: () => { desk.goTo(frame); document.querySelector("div.stage")?.scrollIntoView({ block: "nearest" }); } },
   ]);
 }

@@ -41,7 +41,7 @@ export function comparison(before, after) {
 }
 
 /** Returns the words for a setting. @param {string} name */
-export const settingName = (name) => sayOr(`remeasure.${name}`, name);
+export const settingName = (name) => sayOr(`set.${name}`, name);
 
 /** Returns a row for each setting that differs. @param {Record<string, unknown>} before @param {Record<string, unknown>} after */
 function settingRows(before, after) {
@@ -50,13 +50,13 @@ function settingRows(before, after) {
 }
 
 /** Returns the value of a setting in words. @param {string} name @param {any} value */
-function settingWords(name, value) {
-  if (value === null || value === undefined) return sayOr(`remeasure.${name}.null`, "–");
+export function settingWords(name, value) {
+  if (value === null || value === undefined) return sayOr(`set.${name}.null`, "–");
   const exact = (/** @type {number} */ one) => String(Number(one.toPrecision(4)));
   if (name === "camera") return say("desk.compare.camera", { cm: exact(100 * value.z_min_m), px: exact(value.pane_px_per_m / 100) });
   if (name === "animal") return say("desk.compare.animal", { length: exact(100 * value.length_m), height: exact(100 * value.height_m) });
   if (name === "ignore") return count(value.length);
   if (name === "animal_at" || name === "head") return say("desk.compare.point", { at: (value.at_px ?? value.point).map(Math.round).join(", "), frame: String(value.frame) });
   if (name === "from_s" || name === "to_s") return seconds(value);
-  return sayOr(`remeasure.${name}.${value}`, typeof value === "object" ? JSON.stringify(value) : String(value));
+  return sayOr(`set.${name}.${value}`, typeof value === "object" ? JSON.stringify(value) : String(value));
 }

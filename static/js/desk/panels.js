@@ -101,7 +101,7 @@ function trustPanel(desk, { player, shoot, remeasure }) {
       return element("li", {}, element("button.quiet", { type: "button", onclick: () => { player.pause(); desk.goTo(frame); } }, shoot({ frame, label: words, hasMarks: true, around_px }), element("span", {}, words)));
     });
     node.replaceChildren(...[element("ul.shares", {}, ...bars), element("h3", {}, say("desk.trust.look")), moments.length ? element("ul.weak", {}, ...rows) : element("p.soft", {}, say("desk.trust.fine")),
-      moments.length > 0 && element("p.actions", {}, ...["head", "animal"].map((tool) => element("button.quiet", { type: "button", onclick: () => remeasure(tool) }, say(`desk.trust.${tool}_at`)))) || ""]);
+      moments.length > 0 && element("p.actions", {}, ...["head", "animal"].map((tool) => element("button.quiet", { type: "button", onclick: () => remeasure(tool === "head" ? "head" : "animal_at") }, say(`desk.trust.${tool}_at`)))) || ""]);
   };
   desk.isLoaded.watch(fill, desk.life);
   return node;

@@ -6,7 +6,7 @@ import { element } from "../app/element.js";
 import { signal } from "../app/store.js";
 import { say } from "../app/words.js";
 import { showProblem } from "../parts/problem.js";
-import { createPicture } from "./remeasure-picture.js";
+import { createPicture } from "../editor/picture.js";
 
 /** @typedef {{name: "cm" | "bl" | "px", each: number}} Unit name, and how many of it a pixel is */
 
@@ -27,7 +27,7 @@ export function scalePanel(desk, player) {
   const { library, life, scale } = desk;
   const length_px = library.length_px;
   const ruler = signal(/** @type {number[][] | null} */ (null));
-  const picture = createPicture(desk, { video: player.video, isBroken: player.isBroken.value, tool: signal(/** @type {import("./remeasure-picture.js").Tool} */ ("ruler")), ruler, life });
+  const picture = createPicture({ size: library.image_size_px, moment: desk.moment, video: player.video, isBroken: player.isBroken, picture: `/v1/libraries/${library.id}/background.png` }, { tool: signal(/** @type {import("../editor/picture.js").Tool} */ ("ruler")), ruler, life });
   const problem = element("div");
   const set = async (/** @type {Api.Body<"patch", "/v1/libraries/{id}">} */ change) => {
     try {
@@ -56,6 +56,6 @@ export function scalePanel(desk, player) {
     const size = length_px ? say(px_per_cm ? "desk.size.known" : "desk.size.px", { cm: length_px / (px_per_cm ?? 1), px: length_px }) : say("desk.size.none");
     told.textContent = [...(px_per_cm ? [say("desk.scale.is", { px: px_per_cm })] : []), size].join(" ");
   }, life);
-  return element("div.panel-size", {}, told, element("p.soft", {}, say(`desk.scale.help.${library.view === "top" ? "top" : "side"}`)), element("div.remeasure-box", {}, picture),
+  return element("div.panel-size", {}, told, element("p.soft", {}, say(`desk.scale.help.${library.view === "top" ? "top" : "side"}`)), element("div.editor-box", {}, picture),
     element("div.fields", {}, line.label, length_px ? animal.label : false), problem, element("p.actions", {}, none));
 }

@@ -24,8 +24,8 @@ export function problemBox(reason, mends = []) {
 
 /** @param {Partial<import("../app/api.js").Problem>} problem @param {string} title @param {Mend[]} mends */
 function partsOf(problem, title, mends) {
-  const detail = problem.detail && problem.detail !== problem.title ? sentence(problem.detail) : "";
-  const advice = sayOr(`code.${problem.code}.advice`, problem.advice ?? "").replaceAll("`", "");
+  const detail = problem.detail && problem.detail !== problem.title ? sentence(withoutCommands(problem.detail)) : "";
+  const advice = withoutCommands(sayOr(`code.${problem.code}.advice`, problem.advice ?? ""));
   const parts = [
     element("strong", {}, title),
     // The service tells where and when in English only.
@@ -37,6 +37,9 @@ function partsOf(problem, title, mends) {
   ];
   return parts.flatMap((part) => part || []);
 }
+
+/** Takes away examples for the command line, which a person on the page cannot use. @param {string} text */
+export const withoutCommands = (text) => text.replace(/,?( for example)? with `[^`]* -[^`]*`| \(`--[^`]*`\)/g, "").replaceAll("`", "");
 
 /** Returns a cause of the service as a sentence. @param {string} text */
 const sentence = (text) => (/^ff(mpeg|probe)/.test(text) ? text : text[0].toUpperCase() + text.slice(1)) + (/[.!?。]$/.test(text) ? "" : ".");

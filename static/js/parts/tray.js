@@ -4,9 +4,9 @@ import { byId, element } from "../app/element.js";
 import { addressOf, aheadOf, cancel, isUnderWay, jobs, resultOf, retry, subjectIdOf, uploads } from "../app/jobs.js";
 import { subjectOf } from "../app/names.js";
 import { ago, say, size, stageOf } from "../app/words.js";
-import { fileButton, measure } from "./drop.js";
+import { isDismissed, dismiss, dismissed } from "./dismissed.js";
+import { fileButton } from "./drop.js";
 import { filmButtons } from "./film-buttons.js";
-import { mendsOf } from "./mend.js";
 import { problemBox } from "./problem.js";
 import { timeLeft } from "./time-left.js";
 
@@ -23,12 +23,11 @@ export function fillTray() {
   tray.addEventListener("click", ({ target }) => { if (target instanceof Element && target.closest("a[href]")) tray.hidePopover(); });
   const draw = () => {
     const running = jobs.value.filter(isUnderWay);
-    const shown = [...running, ...jobs.value.filter((job) => !isUnderWay(job)).slice(0, ENDED)];
-    reconcile(list, [...uploads.value.map((one) => ({ key: `upload-${one.id}`, draw: uploadCard, of: one })), ...shown.map((job) => ({ key: job.id, draw: jobCard, of: job }))]);
+    const shown = [...running, ...jobs.value.filter((job) => !isUnderWay(job) && !isDismissed(job.id)).slice(0, ENDED)];
+    reconcile(list, [...uploads.value.map((one) => ({ key: `upload-${one.id}`, draw: uploadCard, of: one })), ...shown.map((job) => ({ key: job.id, draw: trayCard, of: job }))]);
     if (!list.childElementCount) list.append(element("p.soft", {}, say("tray.empty")));
   };
-  jobs.watch(draw);
-  uploads.watch(draw);
+  for (const seen of [jobs, uploads, dismissed]) seen.watch(draw);
 }
 
 /** @template T @typedef {{key: string, draw: (of: T) => HTMLElement & {update: (of: T) => void}, of: T}} Entry */
@@ -45,6 +44,15 @@ export function reconcile(list, entries) {
     return node;
   });
   if (nodes.some((node, idx) => list.children[idx] !== node) || list.childElementCount !== nodes.length) list.replaceChildren(...nodes);
+}
+
+/** Returns the card of a job that can be put away once it has failed. @param {Api.Job} job */
+function trayCard(job) {
+  const card = jobCard(job);
+  const away = element("button.quiet.small", { type: "button", hidden: true, onclick: () => dismiss(job.id) }, say("dismiss"));
+  card.querySelector(".job-line")?.append(away);
+  const { update } = card;
+  return Object.assign(card, { update: (/** @type {Api.Job} */ seen) => { away.hidden = seen.state !== "failed"; update(seen); } });
 }
 
 /** Returns the card of a job. Its `update` shows a newer state. @param {Pick<Api.Job, "kind">} job */
@@ -79,8 +87,7 @@ export function jobCard(job) {
     if (state === drawn) return isNamed ? undefined : void tellSubject(seen);
     drawn = state;
     card.dataset.state = seen.state;
-    const mends = seen.kind === "analysis" ? mendsOf(seen.error ?? {}, (params) => measure(subjectIdOf(seen), params, { show: true })) : [];
-    problem.replaceChildren(...(seen.state === "failed" ? [problemBox(seen.error ?? {}, mends)] : []));
+    problem.replaceChildren(...(seen.state === "failed" ? [problemBox(seen.error ?? {})] : []));
     actions.replaceChildren(...buttonsOf(seen));
     return void tellSubject(seen);
   };
@@ -95,7 +102,8 @@ function buttonsOf(job, film) {
   if (!film || film.isGone) return [];
   if (job.state === "done") return job.kind === "sample" ? [] : [element("a.button.quiet", { href: addressOf(job) }, say("job.open")), ...(job.kind === "flock" ? filmButtons(resultOf(job)) : [])];
   const again = job.retriable ? [element("button.quiet", { type: "button", onclick: once(() => retry(job.id)) }, say("job.retry"))] : [];
-  if (job.kind === "analysis") return [...(again.length ? again : [element("button.quiet", { type: "button", onclick: () => measure(subjectIdOf(job), {}, { show: true }) }, say("job.again"))]), element("a.button.quiet", { href: `/films/${subjectIdOf(job)}` }, say("job.film"))];
+  // The place of a refused film has what mends it.
+  if (job.kind === "analysis") return [...again, element("a.button.quiet", { href: `/films/${subjectIdOf(job)}` }, say(job.state === "failed" ? "job.mend" : "job.film"))];
   return job.kind === "flock" ? [...again, element("a.button.quiet", { href: `/libraries/${subjectIdOf(job)}/studio` }, say("reels.studio"))] : again;
 }
 

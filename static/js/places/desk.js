@@ -40,8 +40,8 @@ export async function show(root, { id, query, life }) {
   const transport = createTransport(desk, { player, nextJump });
   const axis = createTimeAxis(desk, player, [...createPlots(desk), createArcs(desk)]);
   const results = element("section.results", { "aria-live": "polite" });
-  const remeasure = (tool = "", params = {}) => import("../desk/remeasure.js")
-    .then(({ openRemeasure }) => openRemeasure(desk, { player, results, tool, params }))
+  const remeasure = (focus = "animal_at", patch = {}) => import("../desk/again.js")
+    .then(({ measureAgain }) => measureAgain(desk, { player, results, opening: { focus, patch } }))
     .catch((problem) => { if (!life.aborted) showProblem(results, problem); });
   const panels = createPanels(desk, { player, pictures, shoot, tab: query.get("tab") ?? "", remeasure });
   const showTab = (/** @type {string} */ tab) => { panels.chosen.set(tab); panels.node.scrollIntoView({ block: "nearest" }); /** @type {HTMLElement | null} */ (panels.node.querySelector(`#tab-${tab}`))?.focus({ preventScroll: true }); };
@@ -50,7 +50,7 @@ export async function show(root, { id, query, life }) {
 
   root.append(
     element("header.place-head", {}, element("h1", { tabIndex: -1 }, filmName(library)),
-      element("p.actions", {}, element("a.button", { href: `/libraries/${id}/studio` }, say("film.studio")), element("a.button.quiet", { href: `/films/${library.footage_id}` }, say("desk.the_film")), element("button.quiet#measure-again", { type: "button", onclick: () => remeasure("", {}) }, say("remeasure.title")), element("a.button.quiet", { href: `/libraries/${id}/fish`, title: say("desk.fish.help") }, say("desk.fish")))),
+      element("p.actions", {}, element("a.button", { href: `/libraries/${id}/studio` }, say("film.studio")), element("a.button.quiet", { href: `/films/${library.footage_id}` }, say("desk.the_film")), element("button.quiet#measure-again", { type: "button", onclick: () => remeasure() }, say("job.again")), element("a.button.quiet", { href: `/libraries/${id}/fish`, title: say("desk.fish.help") }, say("desk.fish")))),
     failure,
     element("div.desk-pair", {},
       element("section.desk-film", { "aria-label": say("desk.film") }, stage.node, stage.controls, transport.node, transport.reading),

@@ -2,17 +2,17 @@
 // @ts-check
 import { get, list } from "../app/api.js";
 import { element, releaseVideo } from "../app/element.js";
-import { ended, isUnderWay, jobs, resultOf, whenReady } from "../app/jobs.js";
+import { ended, expect, isUnderWay, jobs, resultOf, whenReady } from "../app/jobs.js";
 import { isCalm } from "../app/motion.js";
 import { filmName } from "../app/names.js";
 import { go, setTitle } from "../app/router.js";
 import { sent } from "../app/upload.js";
 import { count, say, seconds } from "../app/words.js";
 import { filmPicture } from "../parts/cards.js";
+import { mendsOf } from "../editor/mends.js";
 import { measure } from "../parts/drop.js";
 import { showFlock } from "../parts/hero.js";
 import { preview } from "../parts/living.js";
-import { mendsOf } from "../parts/mend.js";
 import { problemBox, showProblem } from "../parts/problem.js";
 import { jobCard } from "../parts/tray.js";
 import { deleteLater } from "../parts/undo.js";
@@ -20,7 +20,8 @@ import { deleteLater } from "../parts/undo.js";
 /** First flock of a film: as many as have room. */
 const FIRST = { frames: 300 };
 
-/** @typedef {{film: Api.Footage, stage: HTMLElement, status: HTMLElement, life: AbortSignal}} Parts */
+/** @typedef {{film: Api.Footage, stage: HTMLElement, status: HTMLElement, life: AbortSignal, known: Known}} Parts */
+/** @typedef {{library?: Api.Library, former?: Record<string, any>}} Known the newest measurement, and the parameters of the last one, which may have failed */
 
 /** @param {HTMLElement} root @param {import("../app/router.js").Visit} visit */
 export async function show(root, { id, life, state }) {
@@ -30,10 +31,12 @@ export async function show(root, { id, life, state }) {
   const stage = element("section.hero", { "aria-label": say("home.film") });
   const status = element("div.status", { "aria-live": "polite" });
   const drop = element("button.quiet.small", { type: "button", onclick: discard }, say("film.delete"));
+  const settings = element("button.quiet.small#change-settings", { type: "button", onclick: () => edit(parts) }, say("film.settings"));
   root.append(element("header.place-head", {}, element("div", {}, element("h1", { tabIndex: -1 }, name),
     element("p.soft", {}, [seconds(film.n_frames_hint / film.fps), film.image_size_px.join(" × "), say("unit.fps", { n: count(film.fps) })].join(" · "))),
-  element("p.actions", {}, drop)), stage, status);
-  const parts = { film, stage, status, life };
+  element("p.actions", {}, settings, drop)), stage, status);
+  /** @type {Parts} */
+  const parts = { film, stage, status, life, known: {} };
   await whenReady(life);
   const job = await jobOf(id, state?.job, life);
   // The place is shown now: the router need not wait for the end of the job to set the focus.
@@ -94,8 +97,30 @@ async function follow(job, parts) {
     if (/** @type {any} */ (problem).name === "AbortError") {
       const button = offer(parts, say("film.cancelled"));
       if (hadFocus) button.focus();
-    } else status.replaceChildren(problemBox(problem, [...mendsOf(problem, (params) => measure(film.id, params, { show: true }), film.n_frames_hint / film.fps),
-      { label: say("job.again"), act: () => measure(film.id, {}, { show: true }), quiet: true }]));
+    } else showRefusal(/** @type {import("../app/api.js").Problem} */ (problem), parts);
+  }
+}
+
+/** Shows why the film was refused, with what may mend it. @param {import("../app/api.js").Problem} problem @param {Parts} parts */
+function showRefusal(problem, parts) {
+  parts.known.former = problem.params ?? {};
+  const mends = mendsOf(problem, (mend) => edit(parts, (editor) => editor.openedBy(mend, problem)));
+  parts.status.replaceChildren(problemBox(problem, mends), ...(mends.length ? [] : [element("p.soft", {}, say("mend.none"))]));
+}
+
+/**
+ * Opens the editor. @param {Parts} parts
+ * @param {(editor: typeof import("../editor/editor.js")) => Partial<import("../editor/editor.js").Opening>} [opened]
+ */
+async function edit({ film, status, life, known }, opened = () => ({})) {
+  try {
+    const editor = await import("../editor/editor.js");
+    await editor.openEditor({ film, library: known.library, former: known.former ?? known.library?.params, ...opened(editor), life, async onBegun({ job_id, footage_id }) {
+      await expect(job_id);
+      go(`/films/${footage_id}`, { job: job_id });
+    } });
+  } catch (problem) {
+    if (!life.aborted) showProblem(status, problem);
   }
 }
 
@@ -106,10 +131,11 @@ async function showMeasured(libraryId, parts, note = "") {
     const planning = preview(libraryId, FIRST, life);
     planning.catch(() => {});
     const library = await get(`/v1/libraries/${libraryId}`, life);
+    parts.known.library = library;
     const studio = element("a.button", { href: `/libraries/${libraryId}/studio` }, say("film.studio"));
     const links = [studio, element("a.button.quiet", { href: `/libraries/${libraryId}` }, say("film.desk"))];
     await showFlock(stage, { library, planning, life, links });
-    const again = element("button.quiet", { type: "button", onclick: () => measure(film.id, {}, { show: true }) }, say("job.again"));
+    const again = element("button.quiet", { type: "button", onclick: () => edit(parts) }, say("job.again"));
     const fish = element("a.button.quiet", { href: `/libraries/${libraryId}/fish`, title: say("desk.fish.help") }, say("desk.fish"));
     const hadFocus = status.contains(document.activeElement);
     status.replaceChildren(element("p", {}, note || say("film.flock"), " ", say("film.next")), element("p.actions", {}, again, fish));

@@ -24,6 +24,7 @@ export const choiceOf = (name, choice) => sayOr(`set.${name}.${choice}`, choice.
 export function control(field, studio) {
   if (field.kind === "boolean") return toggle(field, studio);
   if (field.kind === "choice") return choice(field, studio);
+  if (field.kind === "numbers") return numbers(field, studio);
   return slider(field, studio);
 }
 
@@ -64,8 +65,9 @@ function toggle(field, studio) {
 
 /** @param {Field} field @param {Studio} studio @returns {Control} */
 function choice(field, studio) {
+  const none = field.nullable && element("option", { value: "" }, sayOr(`set.${field.name}.null`, say("set.auto")));
   const options = field.choices.map((one) => element("option", { value: one }, choiceOf(field.name, one)));
-  const input = element("select", { onchange: () => studio.change({ [field.name]: input.value }) }, ...options);
+  const input = element("select", { onchange: () => studio.change({ [field.name]: input.value || null }) }, none, ...options);
   const { node, setReset } = framed(field, studio, { input });
   return {
     node, name: field.name,
@@ -75,6 +77,16 @@ function choice(field, studio) {
       setReset(isSet, isIdle);
     },
   };
+}
+
+/** Some numbers in a row, such as a point. @param {Field} field @param {Studio} studio @returns {Control} */
+function numbers(field, studio) {
+  const input = element("input.number", { type: "text", inputMode: "decimal", placeholder: say("set.auto"), onchange: () => {
+    const all = input.value.split(/[,\s]+/).filter(Boolean).map(Number);
+    studio.change({ [field.name]: all.length && all.every(Number.isFinite) ? all : null });
+  } });
+  const { node, setReset } = framed(field, studio, { input });
+  return { node, name: field.name, update(value, { isSet }) { input.value = value?.join(", ") ?? ""; setReset(isSet); } };
 }
 
 /** A slider over the useful range, and a number field over the whole one. @param {Field} field @param {Studio} studio @returns {Control} */

@@ -19,6 +19,8 @@ export const USUAL = {
   "rules.picture_separation_bl": [0, 4], "rules.alignment_bl": [0.1, 15], "rules.cohesion_bl": [0.1, 20], "rules.neighbors": [1, 64],
   "rules.zones.repulsion_bl": [0.1, 5], "rules.zones.orientation_bl": [0, 20], "rules.zones.attraction_bl": [0, 30],
   "depth_bl": [0, 12], "spacing_bl": [0.2, 6], "matching.segment_frames": [2, 300], "render.haze_per_bl": [0, 0.5],
+  "threshold": [1, 100], "fps": [1, 240], "pixel_aspect": [0.5, 2], "clip_frames": [2, 40], "kappa": [1, 6], "epsilon": [0, 1e6],
+  "camera.z_min_m": [0.1, 3], "camera.pane_px_per_m": [100, 10_000], "camera.medium_index": [1, 1.5], "animal.length_m": [0.005, 1], "animal.height_m": [0.002, 0.5],
 };
 
 /** Least and most of settings whose schema lacks them. It can go when every service tells them as data. */

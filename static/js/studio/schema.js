@@ -5,7 +5,7 @@ import { wordsOfService } from "../app/words.js";
 import { proseLimits } from "./limits.js";
 
 /**
- * @typedef {{name: string, kind: "number" | "whole" | "boolean" | "choice" | "group" | "other", min: number, max: number,
+ * @typedef {{name: string, kind: "number" | "whole" | "boolean" | "choice" | "numbers" | "group" | "other", min: number, max: number,
  *   step: number, choices: string[], default: any, nullable: boolean, help: string}} Field
  * @typedef {Api.JsonSchema} Schema
  * @typedef {Map<string, Field>} Fields by name, with dots between levels
@@ -24,10 +24,10 @@ function load() {
   return known;
 }
 
-/** Returns the fields of a flock, or of a virtual fish. @param {"Flock" | "Fish"} [kind] @returns {Promise<Fields>} */
+/** Returns the fields of a flock, a virtual fish, or an analysis. @param {"Flock" | "Fish" | "Analysis"} [kind] @returns {Promise<Fields>} */
 export async function loadFields(kind = "Flock") {
   const [schemas] = await Promise.all([load(), wordsOfService()]);
-  return fieldsOf(schemas, `${kind}Params`, `${kind}Request`);
+  return fieldsOf(schemas, `${kind}Params`, kind === "Analysis" ? "AnalysisOverrides" : `${kind}Request`);
 }
 
 /** Returns the defaults of the parameters of an analysis by name. @returns {Promise<Api.AnalysisParams>} */
@@ -54,7 +54,7 @@ function fieldsOf(schemas, params, request) {
   };
   collect(schemas[params], "", null);
   const preset = schemas[request]?.properties?.preset ?? {};
-  const choices = choicesOf(preset.enum ?? PRESETS);
+  const choices = choicesOf(plain(preset, schemas).type.enum ?? PRESETS);
   fields.set("preset", { ...fieldOf("preset", { ...preset, type: "string" }, null, true), kind: "choice", choices });
   return fields;
 }
@@ -83,10 +83,13 @@ function plain(schema, schemas) {
 function fieldOf(name, type, value, nullable) {
   const [min, max] = limitsOf(name, type);
   const isNumber = type.type === "number" || type.type === "integer";
-  const kind = type.type === "integer" ? "whole" : isNumber ? "number" : type.type === "boolean" ? "boolean" : type.enum ? "choice" : "other";
+  const kind = type.type === "integer" ? "whole" : isNumber ? "number" : type.type === "boolean" ? "boolean" : type.enum ? "choice" : isList(type) ? "numbers" : "other";
   const step = type.multipleOf ?? (name === "fade_frames" ? 2 : kind === "whole" ? 1 : max <= 1 ? 0.01 : 0.05);
   return { name, kind, min, max, step, choices: choicesOf(type.enum), default: value, nullable, help: tidy(type.description) };
 }
+
+/** Whether a value is a list of as many numbers as its schema says. @param {Schema} type */
+const isList = ({ items, minItems }) => Boolean(minItems) && (items?.type === "number" || items?.type === "integer");
 
 /** Returns the choices of an enumeration; null is none. @param {(string | null)[]} [all] */
 const choicesOf = (all = []) => all.flatMap((one) => one || []);

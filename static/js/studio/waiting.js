@@ -2,10 +2,11 @@
 // @ts-check
 import { list } from "../app/api.js";
 import { element } from "../app/element.js";
-import { isUnderWay, jobs, resultOf, whenReady } from "../app/jobs.js";
-import { thing } from "../app/names.js";
+import { isUnderWay, jobs, resultOf, subjectIdOf, whenReady } from "../app/jobs.js";
+import { subjectOf, thing } from "../app/names.js";
 import { setTitle } from "../app/router.js";
 import { say } from "../app/words.js";
+import { dismiss, dismissed, isDismissed } from "../parts/dismissed.js";
 import { fileButton } from "../parts/drop.js";
 import { jobCard, reconcile } from "../parts/tray.js";
 
@@ -15,7 +16,7 @@ const KINDS = ["sample", "analysis"];
 const ANIMALS = 200;
 
 /**
- * Returns the cards of the measurements under way; hidden if there are none. Those that fail stay and tell why.
+ * Returns the cards of the measurements under way; hidden if there are none. Of those that fail, a line leads to the film.
  * @param {{life: AbortSignal, isMeant?: (job: Api.Job) => boolean, onMeasured: (libraryId: string) => void}} options
  *   `isMeant`: jobs that matter here; onMeasured hears of each that is done
  */
@@ -24,17 +25,28 @@ export function underWay({ life, isMeant = () => true, onMeasured }) {
   const node = element("section.under-way", { hidden: true, "aria-label": say("tray.title") }, cards);
   /** Ids of the jobs that were under way since this is shown. */
   const seen = new Set();
-  jobs.watch((all) => {
-    const meant = all.filter((job) => KINDS.includes(job.kind) && isMeant(job));
+  const draw = () => {
+    const meant = jobs.value.filter((job) => KINDS.includes(job.kind) && isMeant(job));
     for (const job of meant) if (isUnderWay(job)) seen.add(job.id);
     const done = meant.filter((job) => job.state === "done" && seen.has(job.id));
     for (const { id } of done) seen.delete(id);
-    const shown = meant.filter((job) => seen.has(job.id)).reverse();
-    reconcile(cards, shown.map((job) => ({ key: job.id, draw: jobCard, of: job })));
+    const shown = meant.filter((job) => seen.has(job.id) && !isDismissed(job.id)).reverse();
+    reconcile(cards, shown.map((job) => ({ key: `${job.id} ${job.state === "failed"}`, draw: job.state === "failed" ? refusalLine : jobCard, of: job })));
     node.hidden = shown.length === 0;
     for (const job of done) if (job.kind === "analysis") onMeasured(resultOf(job));
-  }, life);
+  };
+  jobs.watch(draw, life);
+  dismissed.watch(draw, life);
   return node;
+}
+
+/** Returns the line of a measurement that failed: it leads to the film, and can be put away. @param {Api.Job} job */
+function refusalLine(job) {
+  const text = element("span");
+  subjectOf(job).then(({ name }) => { text.textContent = say("studio.refused", { film: name }); }).catch(() => {});
+  const away = element("button.quiet", { type: "button", onclick: () => dismiss(job.id) }, say("dismiss"));
+  const node = element("p.refused", { role: "status" }, text, element("a.button.quiet", { href: `/films/${subjectIdOf(job)}` }, say("job.mend")), away);
+  return Object.assign(node, { update() {} });
 }
 
 /**

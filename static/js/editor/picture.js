@@ -1,19 +1,21 @@
 // A picture of the film, on which the person points at the animal or its head, frames regions to ignore, or draws a ruler. With the keyboard, arrows move a cross, and Enter sets a point or the corners of a box.
 // @ts-check
 import { say } from "../app/words.js";
-import { drawnCanvas, fitted, loadPicture } from "./canvas.js";
+import { drawnCanvas, fitted, loadPicture } from "../desk/canvas.js";
 
 /** @typedef {"animal" | "head" | "ignore" | "ruler"} Tool */
 /** Shortest side of a box and length of a ruler, pixels of the film. */
 const LEAST_PX = 4;
 
+/** @typedef {{size: number[], moment: import("../app/store.js").Signal<number>, video: HTMLVideoElement, isBroken: import("../app/store.js").Signal<boolean>, picture: string}} Shown a film, and the address of a picture for where it cannot be played */
+
 /**
- * @param {import("./instrument.js").Instrument} desk
- * @param {{video: HTMLVideoElement, isBroken: boolean, tool: import("../app/store.js").Signal<Tool>, draft?: import("./remeasure-fields.js").Draft, ruler?: import("../app/store.js").Signal<number[][] | null>, life: AbortSignal}} parts
- *   draft: takes points and boxes; ruler: takes the line
+ * @param {Shown} film
+ * @param {{tool: import("../app/store.js").Signal<Tool>, draft?: import("./editor.js").Draft, proposed?: number[][], ruler?: import("../app/store.js").Signal<number[][] | null>, life: AbortSignal}} parts
+ *   draft: takes points and boxes; proposed: boxes that the service proposes to ignore; ruler: takes the line
  */
-export function createPicture(desk, { video, isBroken, tool, draft, ruler, life }) {
-  const size = desk.library.image_size_px;
+export function createPicture(film, { tool, draft, proposed = [], ruler, life }) {
+  const { size, video, isBroken } = film;
   /** @type {ImageBitmap | null} */
   let background = null;
   /** Start and end of what is being drawn, pixels of the film. @type {number[][] | null} */
@@ -21,18 +23,23 @@ export function createPicture(desk, { video, isBroken, tool, draft, ruler, life 
   /** Cross of the keyboard. */
   let cross = size.map((side) => side / 2);
   let isKeyboard = false;
-  const { canvas, ask } = drawnCanvas(life, draw, { tabIndex: 0, className: "remeasure-picture", role: "application", "aria-label": say("remeasure.picture") });
+  const { canvas, ask } = drawnCanvas(life, draw, { tabIndex: 0, className: "editor-picture", role: "application", "aria-label": say("editor.picture") });
   canvas.style.aspectRatio = size.join(" / ");
 
-  /** @param {import("./canvas.js").Paper} paper */
+  /** @param {import("../desk/canvas.js").Paper} paper */
   function draw({ context, width, height, colors }) {
     const { zoom, left, top } = fitted(size, width, height);
     context.translate(left, top);
     context.scale(zoom, zoom);
-    const source = !isBroken && video.readyState >= 2 ? video : background;
+    const source = !isBroken.value && video.readyState >= 2 ? video : background;
     if (source) context.drawImage(source, 0, 0, size[0], size[1]);
     context.lineWidth = 2 / zoom;
-    const frames = [...(draft?.value.ignore ?? []).map(({ box_px }) => box_px), ...(drawing && tool.value === "ignore" ? [boxOf(drawing)] : [])];
+    for (const [x, y, w, h] of proposed) {
+      context.strokeStyle = "#e8641b";
+      context.strokeRect(x, y, w, h);
+    }
+    const ignored = /** @type {{box_px: number[]}[]} */ (draft?.value.ignore ?? []);
+    const frames = [...ignored.map(({ box_px }) => box_px), ...(drawing && tool.value === "ignore" ? [boxOf(drawing)] : [])];
     for (const [x, y, w, h] of frames) {
       context.fillStyle = "rgb(163 22 31 / 0.45)";
       context.fillRect(x, y, w, h);
@@ -55,11 +62,11 @@ export function createPicture(desk, { video, isBroken, tool, draft, ruler, life 
   const end = () => {
     if (!drawing) return;
     const [from, to] = drawing;
-    const frame = desk.moment.value;
+    const frame = film.moment.value;
     if (draft && tool.value === "animal") draft.set({ ...draft.value, animal_at: { frame, at_px: to } });
     if (draft && tool.value === "head") draft.set({ ...draft.value, head: { frame, point: to } });
     const box_px = boxOf(drawing);
-    if (draft && tool.value === "ignore" && box_px[2] >= LEAST_PX && box_px[3] >= LEAST_PX) draft.set({ ...draft.value, ignore: [...draft.value.ignore, { box_px, from_s: null, to_s: null }] });
+    if (draft && tool.value === "ignore" && box_px[2] >= LEAST_PX && box_px[3] >= LEAST_PX) draft.set({ ...draft.value, ignore: [...draft.value.ignore ?? [], { box_px, from_s: null, to_s: null }] });
     if (tool.value === "ruler" && Math.hypot(to[0] - from[0], to[1] - from[1]) >= LEAST_PX) ruler?.set(drawing);
     drawing = null;
     ask();
@@ -80,9 +87,9 @@ export function createPicture(desk, { video, isBroken, tool, draft, ruler, life 
     ask();
   });
   canvas.addEventListener("blur", () => { isKeyboard = false; ask(); });
-  for (const seen of [draft, ruler, tool, desk.moment]) seen?.watch(ask, life);
-  video.addEventListener("seeked", ask, { signal: life });
-  if (isBroken || video.readyState < 2) void loadPicture(`/v1/libraries/${desk.library.id}/background.png`, life).then((found) => { background = found; ask(); });
+  for (const seen of [draft, ruler, tool, film.moment]) seen?.watch(ask, life);
+  isBroken.watch((now) => { if (now) void loadPicture(film.picture, life).then((found) => { background = found; ask(); }); }, life);
+  for (const event of ["seeked", "loadeddata"]) video.addEventListener(event, ask, { signal: life });
   return canvas;
 }
 
