@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 import films
-from conftest import PROGRAM, started
+from conftest import PROGRAM, post, started
 from steps import LONG_MS, choose_film, get, open_tray, said, say, until
 
 pytestmark = pytest.mark.thorough
@@ -164,3 +164,21 @@ def test_no_advice_of_any_code_shows_a_flag(page, service):
     texts = page.evaluate(script, [one["advice"] for one in get(f"{service}/v1/errors")])
     assert len(texts) > 60
     assert [text for text in texts if re.search(FLAG, text)] == []
+
+
+def test_a_refusal_is_one_line_in_the_studio_and_can_be_put_away(page, filled_service, tmp_path):
+    page.goto(f"{filled_service}/studio")
+    expect(page.locator(".studio-view")).to_be_visible(timeout=LONG_MS)
+    film = films.write(tmp_path / "moth.mp4", films.several_animals(seed=7)).read_bytes()
+    footage = post(f"{filled_service}/v1/footage?name=moth.mp4", film, "video/mp4")["id"]
+    post(f"{filled_service}/v1/analyses", {"footage_id": footage})
+    line = page.locator(".refused")
+    expect(line).to_contain_text(say(page, "studio.refused", film="moth"), timeout=LONG_MS)
+    expect(page.get_by_role("main").get_by_role("alert")).to_have_count(0)
+    expect(line.get_by_role("link", name=say(page, "job.mend"))).to_have_attribute("href", f"/films/{footage}")
+    assert line.bounding_box()["height"] < 80
+    line.get_by_role("button", name=say(page, "dismiss")).click()
+    expect(line).to_have_count(0)
+    expect(open_tray(page)).not_to_contain_text("several_animals")
+    page.goto(f"{filled_service}/jobs")
+    expect(page.get_by_role("main")).to_contain_text("several_animals", timeout=LONG_MS)

@@ -53,7 +53,7 @@ def test_a_refused_film_tells_the_reason_the_advice_and_offers_what_mends_it(pag
         expect(alert.get_by_role("button")).to_have_count(0)
         return
     alert.get_by_role("button").click()
-    focused = "document.activeElement.name || document.activeElement.closest('[data-name]').dataset.name"
+    focused = "(document.activeElement.name || document.activeElement.closest('[data-name]')?.dataset.name)"
     until(page, f"document.querySelector('dialog.editor') && {focused} === '{MENDED[code]}'")
 
 
