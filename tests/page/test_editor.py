@@ -126,7 +126,7 @@ def test_a_film_that_was_cut_off_says_that_it_must_be_copied_again(page, service
     film.write_bytes(whole[: len(whole) // 2])
     page.goto(service)
     choose_film(page, film)
-    alert = open_tray(page).get_by_role("alert")
+    alert = open_tray(page).get_by_role("alert").filter(has_text="truncated")
     expect(alert).to_contain_text("truncated", timeout=LONG_MS)
     expect(alert).to_contain_text("Copy the file from the camera again.")
     assert not re.search(FLAG, alert.inner_text())
