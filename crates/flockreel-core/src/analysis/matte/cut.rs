@@ -8,6 +8,7 @@
 use std::collections::VecDeque;
 
 use super::coat::Coat;
+use super::seen::Around;
 use crate::analysis::scene::background::Background;
 use crate::analysis::silhouette::Difference;
 use crate::raster::Mask;
@@ -18,6 +19,9 @@ const MAX_ODDS: f32 = 6.0;
 /// Log-odds that a pixel shows the animal within the silhouette, and that it does not beyond. Free
 /// choice.
 const SILHOUETTE_ODDS: f32 = 1.0;
+/// Log-odds that a pixel shows the animal if the cut of a frame nearby does, and that it does not if that does not.
+/// Free choice: the cuts of four frames outweigh a color.
+const CUT_ODDS: f32 = 2.0;
 /// Cost of two neighbors on two sides where the frame is even. Free choice.
 const SMOOTHNESS: f32 = 1.5;
 /// Greatest width of gaps in the silhouette that are of the animal, pixels. A wire across the animal leaves one.
@@ -31,6 +35,10 @@ pub(super) struct Cut<'a> {
     pub(super) coat: &'a Coat,
     /// The silhouette in the box of the difference.
     pub(super) silhouette: &'a Mask,
+    /// Mean of the squared differences of neighbors in the frame ([`mean_gap`]).
+    pub(super) mean_gap: f32,
+    /// The animal in frames around this one.
+    pub(super) around: &'a [Around<'a>],
 }
 
 impl Cut<'_> {
@@ -68,7 +76,7 @@ impl Cut<'_> {
 
     /// Lets pixels change sides until no change lowers the energy.
     fn settle(&self, animal: &mut Mask, odds: &mut [f32]) {
-        let gap = self.mean_gap();
+        let gap = self.mean_gap;
         let is_outline = |k: &usize| {
             let side = animal.bits[*k];
             self.neighbors(*k)
@@ -111,17 +119,25 @@ impl Cut<'_> {
             let is_free = self.coat.grows && self.difference.levels[k] > 0;
             odds[k] = if is_inside || is_free {
                 let own = self.coat.log_odds(self.difference, self.background, k);
-                let bias = if is_inside {
-                    SILHOUETTE_ODDS
-                } else {
-                    -SILHOUETTE_ODDS
-                };
-                own.clamp(-MAX_ODDS, MAX_ODDS) + bias
+                own.clamp(-MAX_ODDS, MAX_ODDS) + self.prior(k)
             } else {
                 -MAX_ODDS
             };
         }
         odds[k]
+    }
+
+    /// Returns the log-odds that a pixel shows the animal without the likelihoods of its color: by the silhouette, and
+    /// by the cuts of the frames around as far as they show the same color there.
+    fn prior(&self, k: usize) -> f32 {
+        let side = |shows: bool| if shows { 1.0 } else { -1.0 };
+        let own = SILHOUETTE_ODDS * side(self.silhouette.bits[k] == 1);
+        let color = &self.difference.rgb.pixels[3 * k..3 * k + 3];
+        let votes = self.around.iter().filter_map(|around| {
+            let (shows, there) = around.at(self.silhouette.rect, k)?;
+            Some(side(shows) * libm::expf(-0.5 * gap(color, &there) / self.mean_gap))
+        });
+        own + CUT_ODDS * votes.sum::<f32>()
     }
 
     /// Returns the neighbors of a pixel (8-connected), and their squared distances.
@@ -140,16 +156,22 @@ impl Cut<'_> {
     /// Returns the squared difference of the colors of two pixels.
     fn gap(&self, p: usize, q: usize) -> f32 {
         let rgb = &self.difference.rgb.pixels;
-        let pairs = rgb[3 * p..3 * p + 3].iter().zip(&rgb[3 * q..3 * q + 3]);
-        pairs.map(|(p, q)| f32::from(p.abs_diff(*q)).powi(2)).sum()
+        gap(&rgb[3 * p..3 * p + 3], &rgb[3 * q..3 * q + 3])
     }
+}
 
-    /// Returns the mean of the squared differences of neighbors in a row.
-    fn mean_gap(&self) -> f32 {
-        let n = self.silhouette.bits.len().max(2) - 1;
-        let sum: f32 = (0..n).map(|k| self.gap(k, k + 1)).sum();
-        (sum / n as f32).max(1.0)
-    }
+/// Returns the squared difference of two colors.
+fn gap(p: &[u8], q: &[u8]) -> f32 {
+    let pairs = p.iter().zip(q);
+    pairs.map(|(p, q)| f32::from(p.abs_diff(*q)).powi(2)).sum()
+}
+
+/// Returns the mean of the squared differences of neighbors in a row.
+pub(super) fn mean_gap(difference: &Difference) -> f32 {
+    let rgb = &difference.rgb.pixels;
+    let pairs = rgb.chunks_exact(3).zip(rgb[3..].chunks_exact(3));
+    let sum: f32 = pairs.map(|(p, q)| gap(p, q)).sum();
+    (sum / (rgb.len() / 3).max(2) as f32).max(1.0)
 }
 
 /// Clears all but the largest piece; narrow gaps separate none.

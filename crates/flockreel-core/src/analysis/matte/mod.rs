@@ -11,10 +11,12 @@
 mod coat;
 mod cut;
 mod given;
+mod seen;
 
 pub use self::coat::Coat;
 use self::coat::{dot, minus};
-use self::cut::Cut;
+use self::cut::{Cut, mean_gap};
+pub use self::seen::{Seen, Shape, Stored};
 use super::scene::background::Background;
 use super::scene::light::Light;
 use super::silhouette::{self, Difference};
@@ -51,44 +53,68 @@ const BAND_PX: u32 = 2;
 /// it doubles while the animal reaches its border.
 pub const MARGIN_PX: u32 = 16;
 
-/// Returns the matte of a silhouette.
+/// A cut-out of one frame, and what a second cut of it needs.
+pub struct CutOut {
+    /// The animal.
+    pub matte: Matte,
+    /// The frame around it; `None` where the frame has a given mask.
+    pub seen: Option<Seen>,
+}
+
+/// Cuts the animal out around a silhouette.
 ///
 /// `length_px` is the approximate length of the animal; no part lies farther from the silhouette. When the
 /// frame has a given mask, its alpha is used.
-pub fn pull(view: &View, silhouette: &Mask, length_px: f64) -> Matte {
+pub fn pull(view: &View, silhouette: &Mask, length_px: f64) -> CutOut {
     let frame = view.frame;
     if let Some(given) = &frame.mask {
-        return given::pull(frame, given, silhouette);
+        let matte = given::pull(frame, given, silhouette);
+        return CutOut { matte, seen: None };
     }
-    let background = view.background;
     let mut margin_px = MARGIN_PX;
-    let (difference, solid) = loop {
+    let seen = loop {
         let rect = (silhouette.rect).inflated(margin_px, frame.width, frame.height);
-        let mut difference = silhouette::difference(frame, background, view.light, rect);
+        let mut difference = silhouette::difference(frame, view.background, view.light, rect);
         (view.ignored.iter()).for_each(|ignored| difference.clear(*ignored));
+        let silhouette = over_box(silhouette, rect);
         let cut = Cut {
             difference: &difference,
-            background,
+            background: view.background,
             coat: view.coat,
-            silhouette: &over_box(silhouette, rect),
+            silhouette: &silhouette,
+            mean_gap: mean_gap(&difference),
+            around: &[],
         };
         let solid = cut.animal(2 * BAND_PX);
         margin_px *= 2;
         if !reaches_edge(&solid, frame) || f64::from(margin_px) > length_px {
-            break (difference, solid);
+            break Seen {
+                difference,
+                silhouette,
+                solid,
+            };
         }
     };
+    let matte = painted(&seen.difference, view.background, &seen.solid);
+    CutOut {
+        matte,
+        seen: Some(seen),
+    }
+}
+
+/// Returns the matte of the pixels that show the animal.
+fn painted(difference: &Difference, background: &Background, solid: &Mask) -> Matte {
     let rect = difference.rect;
     let inside = solid.eroded_by(BAND_PX);
     let outer = solid.dilated_by(BAND_PX);
     let puller = MattePuller {
-        difference: &difference,
+        difference,
         background,
-        solid: &solid,
+        solid,
         inside: &inside,
         broad: &solid.eroded().dilated_by(2),
         nearest_inside: nearest_set(&inside, &outer),
-        nearest_solid: nearest_set(&solid, &outer),
+        nearest_solid: nearest_set(solid, &outer),
     };
     let mut image = RgbaImage::new(rect.w, rect.h);
     for (k, pixel) in image.pixels.chunks_exact_mut(4).enumerate() {

@@ -11,7 +11,7 @@ use crate::raster::runs;
 const THIN_SHARE: f64 = 0.3;
 
 /// Returns the largest part of a silhouette without its thin parts; empty for an empty silhouette.
-pub(super) fn without_thin_parts(silhouette: &Mask) -> Mask {
+pub(in crate::analysis) fn without_thin_parts(silhouette: &Mask) -> Mask {
     let depth = silhouette.depth_px();
     let half_width = depth.iter().copied().max().unwrap_or(0);
     let thin = (THIN_SHARE * f64::from(half_width)) as u32;

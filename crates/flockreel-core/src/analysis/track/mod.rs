@@ -11,13 +11,14 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 pub mod asymmetry;
-mod body;
+pub(super) mod body;
 mod confidence;
 mod evidence;
 mod identity;
 mod motion;
 mod movers;
 mod path;
+mod recut;
 pub mod sighting;
 mod stretch;
 
@@ -157,10 +158,11 @@ pub fn follow(
     let tracked = tracked.map(|(result, chosen)| {
         result.with_chosen(chosen.map(|(at, confidence)| (at, is_whole * confidence)))
     });
-    let frames: Vec<Tracked> = tracked.collect();
+    let mut frames: Vec<Tracked> = tracked.collect();
     if frames.iter().all(|t| t.sighting.is_none()) {
         return Err(Error::NothingMoves);
     }
+    recut::all(&mut frames, scene, &**scratch, progress)?;
     let scratch = Arc::clone(scratch);
     Ok(Track {
         frames,

@@ -43,6 +43,8 @@ pub struct Sighting {
     pub box_px: Rect,
     /// Whether the silhouette touches the border of the frame or an ignored box.
     pub cut: bool,
+    /// The first cut, for a second one; `None` where a mask is given.
+    pub seen: Option<matte::Stored>,
     /// The frame around the animal; `None` in most frames.
     pub surroundings: Option<Surroundings>,
 }
@@ -63,7 +65,7 @@ const SURROUNDINGS_MARGIN: f64 = 0.3;
 impl Sighting {
     /// Measures a matte at `rect`; returns `None` when all its pixels are transparent.
     ///
-    /// `at`, `confidence`, `box_px`, `cut` and `surroundings` get placeholders.
+    /// `at`, `confidence`, `edge_share`, `box_px`, `cut`, `seen` and `surroundings` get placeholders.
     pub(in crate::analysis) fn measured(rect: Rect, matte: &RgbaImage) -> Option<Sighting> {
         let pixels = matte.pixels.as_chunks::<4>().0;
         let weights: Vec<u8> = pixels.iter().map(|rgba| rgba[3]).collect();
@@ -90,6 +92,7 @@ impl Sighting {
             upright_px: extent_px(quarter),
             box_px: rect,
             cut: false,
+            seen: None,
             surroundings: None,
         })
     }
@@ -121,7 +124,7 @@ impl FrameView<'_> {
         let rect = shape.component.rect;
         let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
         let silhouette = &shape.silhouette;
-        let matte = matte::pull(&self.view, silhouette, length_px);
+        let matte::CutOut { matte, seen } = matte::pull(&self.view, silhouette, length_px);
         let Some(measured) = Sighting::measured(matte.rect, &matte.image) else {
             return Ok(None);
         };
@@ -138,6 +141,7 @@ impl FrameView<'_> {
             ),
             box_px: rect,
             cut,
+            seen: seen.map(|seen| seen.put(scratch)).transpose()?,
             surroundings: margin_px
                 .map(|px| self.surroundings(rect, px, scratch))
                 .transpose()?,

@@ -1,5 +1,6 @@
 //! Tests of mattes with cast shadows, and with floor visible between parts of the animal.
 
+mod around;
 mod dark_wall;
 
 use super::*;
@@ -35,38 +36,72 @@ fn drawn(shade: fn(u32, u32) -> u8) -> Drawn {
 }
 
 fn drawn_on(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Drawn {
+    let scene = Scene::with(ground, shade);
+    let matte = scene.cut(shade).matte;
+    Drawn { matte, shade }
+}
+
+/// A scene, and the colors of an animal in it.
+struct Scene {
+    ground: fn(u32, u32) -> u8,
+    background: Background,
+    coat: Coat,
+}
+
+impl Scene {
+    fn with(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Scene {
+        let [width, height] = SIZE;
+        let sigma = vec![1.5; (width * height) as usize];
+        let background = Background::new(picture(ground), sigma, Params::default().threshold);
+        let silhouette = silhouette_of(ground, shade);
+        let frame = picture(shade);
+        let difference =
+            silhouette::difference(&frame, &background, &Light::NEUTRAL, silhouette.rect);
+        let coat = Coat::learn(&[(difference, &background, silhouette)], true);
+        Scene {
+            ground,
+            background,
+            coat,
+        }
+    }
+
+    fn cut(&self, shade: fn(u32, u32) -> u8) -> CutOut {
+        let view = View {
+            frame: &picture(shade),
+            background: &self.background,
+            light: &Light::NEUTRAL,
+            coat: &self.coat,
+            ignored: &[],
+        };
+        pull(&view, &silhouette_of(self.ground, shade), 60.0)
+    }
+}
+
+fn silhouette_of(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Mask {
     let [width, height] = SIZE;
-    let sigma = vec![1.5; (width * height) as usize];
-    let background = Background::new(picture(ground), sigma, Params::default().threshold);
     let mut silhouette = Mask::new(Rect::of_size(width, height));
     for k in 0..width * height {
         silhouette.bits[k as usize] =
             u8::from(ground(k % width, k / width).abs_diff(shade(k % width, k / width)) > 9);
     }
     silhouette.fill_holes();
-    let frame = picture(shade);
-    let difference = silhouette::difference(&frame, &background, &Light::NEUTRAL, silhouette.rect);
-    let coat = Coat::learn(&[(difference, &background, silhouette.clone())], true);
-    let view = View {
-        frame: &frame,
-        background: &background,
-        light: &Light::NEUTRAL,
-        coat: &coat,
-        ignored: &[],
-    };
-    let matte = pull(&view, &silhouette, 60.0);
-    Drawn { matte, shade }
+    silhouette
+}
+
+/// Returns the color and alpha at a place of the frame.
+fn pixel_of(matte: &Matte, [x, y]: [u32; 2]) -> [u8; 4] {
+    let rect = matte.rect;
+    if !(rect.x..rect.right()).contains(&x) || !(rect.y..rect.bottom()).contains(&y) {
+        return [0; 4];
+    }
+    let k = 4 * ((y - rect.y) * rect.w + x - rect.x) as usize;
+    [0, 1, 2, 3].map(|c| matte.image.pixels[k + c])
 }
 
 impl Drawn {
     /// Returns the color and alpha at a place of the frame.
     fn pixel(&self, x: u32, y: u32) -> [u8; 4] {
-        let rect = self.matte.rect;
-        if !(rect.x..rect.right()).contains(&x) || !(rect.y..rect.bottom()).contains(&y) {
-            return [0; 4];
-        }
-        let k = 4 * ((y - rect.y) * rect.w + x - rect.x) as usize;
-        [0, 1, 2, 3].map(|c| self.matte.image.pixels[k + c])
+        pixel_of(&self.matte, [x, y])
     }
 
     /// Returns the shade of the matte over a background of shade `back`.

@@ -75,6 +75,7 @@ impl BentFish {
             upright_px: f64::from(rect.h),
             box_px: rect,
             cut: false,
+            seen: None,
             surroundings: None,
         };
         (sighting, image)
