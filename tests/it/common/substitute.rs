@@ -45,7 +45,8 @@ pub(crate) fn done(files: &[(&str, &str)], summary: &Value) -> String {
 
 /// Returns a command that fails with this code.
 pub(crate) fn failed(code: &str, is_transient: bool) -> String {
-    let failure = json!({"code": code, "sentence": "why", "is_transient": is_transient});
+    let failure =
+        json!({"code": code, "sentence": "why", "is_transient": is_transient, "mends": []});
     end(&json!({"failed": failure}))
 }
 

@@ -16,12 +16,9 @@ use crate::raster::runs::components;
 
 /// Largest log-likelihood of a pixel; one color does not decide. Free choice.
 const MAX_ODDS: f32 = 6.0;
-/// Log-odds that a pixel shows the animal within the silhouette, and that it does not beyond. Free
-/// choice.
-const SILHOUETTE_ODDS: f32 = 1.0;
-/// Log-odds that a pixel shows the animal if the cut of a frame nearby does, and that it does not if that does not.
-/// Free choice: the cuts of four frames outweigh a color.
-const CUT_ODDS: f32 = 2.0;
+/// Log-odds that a pixel shows the animal if its silhouette or a cut of a frame nearby does, and that it does not if
+/// that does not. Free choice.
+const CUT_ODDS: f32 = 1.0;
 /// Cost of two neighbors on two sides where the frame is even. Free choice.
 const SMOOTHNESS: f32 = 1.5;
 /// Greatest width of gaps in the silhouette that are of the animal, pixels. A wire across the animal leaves one.
@@ -131,13 +128,13 @@ impl Cut<'_> {
     /// by the cuts of the frames around as far as they show the same color there.
     fn prior(&self, k: usize) -> f32 {
         let side = |shows: bool| if shows { 1.0 } else { -1.0 };
-        let own = SILHOUETTE_ODDS * side(self.silhouette.bits[k] == 1);
+        let own = side(self.silhouette.bits[k] == 1);
         let color = &self.difference.rgb.pixels[3 * k..3 * k + 3];
         let votes = self.around.iter().filter_map(|around| {
             let (shows, there) = around.at(self.silhouette.rect, k)?;
             Some(side(shows) * libm::expf(-0.5 * gap(color, &there) / self.mean_gap))
         });
-        own + CUT_ODDS * votes.sum::<f32>()
+        CUT_ODDS * (own + votes.sum::<f32>())
     }
 
     /// Returns the neighbors of a pixel (8-connected), and their squared distances.

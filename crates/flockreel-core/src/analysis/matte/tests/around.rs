@@ -40,7 +40,7 @@ fn frames_around_show_what_one_frame_does_not() {
     let own = scene.cut(bitten).seen.and_then(Seen::shape);
     let own = own.expect("the frame shows the animal");
     let other = mended(&scene).shape().expect("it shows the animal");
-    let around = [(); 4].map(|()| other.from_frame_of(&own));
+    let around = [(); 8].map(|()| other.from_frame_of(&own));
     let seen = seen.expect("no mask is given");
     let again = seen.pull(&scene.background, &scene.coat, &around);
     let again = again.expect("the second cut differs");
