@@ -7,8 +7,8 @@
 
 use std::collections::VecDeque;
 
+use super::around::Around;
 use super::coat::Coat;
-use super::seen::Around;
 use crate::analysis::scene::background::Background;
 use crate::analysis::silhouette::Difference;
 use crate::raster::Mask;

@@ -8,18 +8,19 @@
 //! Values are encoded sRGB, as in the compositor. So a matte over its background reproduces the frame, except
 //! for shadows. See docs/explanation/algorithms.md, "Mattes".
 
+mod around;
 mod coat;
 mod cut;
 mod given;
 mod seen;
 
+pub use self::around::Shape;
 pub use self::coat::Coat;
 use self::coat::{dot, minus};
-use self::cut::{Cut, mean_gap};
-pub use self::seen::{Seen, Shape, Stored};
+pub use self::seen::{Seen, Stored};
 use super::scene::background::Background;
 use super::scene::light::Light;
-use super::silhouette::{self, Difference};
+use super::silhouette::Difference;
 use crate::geometry::Rect;
 use crate::raster::{Frame, Mask, RgbaImage, runs};
 
@@ -53,50 +54,27 @@ const BAND_PX: u32 = 2;
 /// it doubles while the animal reaches its border.
 pub const MARGIN_PX: u32 = 16;
 
-/// A cut-out of one frame, and what a second cut of it needs.
-pub struct CutOut {
-    /// The animal.
+/// A matte of one frame, and what a second cut of the frame needs.
+pub struct Pulled {
+    /// The matte.
     pub matte: Matte,
     /// The frame around it; `None` where the frame has a given mask.
     pub seen: Option<Seen>,
 }
 
-/// Cuts the animal out around a silhouette.
+/// Returns the matte of a silhouette.
 ///
 /// `length_px` is the approximate length of the animal; no part lies farther from the silhouette. When the
 /// frame has a given mask, its alpha is used.
-pub fn pull(view: &View, silhouette: &Mask, length_px: f64) -> CutOut {
+pub fn pull(view: &View, silhouette: &Mask, length_px: f64) -> Pulled {
     let frame = view.frame;
     if let Some(given) = &frame.mask {
         let matte = given::pull(frame, given, silhouette);
-        return CutOut { matte, seen: None };
+        return Pulled { matte, seen: None };
     }
-    let mut margin_px = MARGIN_PX;
-    let seen = loop {
-        let rect = (silhouette.rect).inflated(margin_px, frame.width, frame.height);
-        let mut difference = silhouette::difference(frame, view.background, view.light, rect);
-        (view.ignored.iter()).for_each(|ignored| difference.clear(*ignored));
-        let silhouette = over_box(silhouette, rect);
-        let cut = Cut {
-            difference: &difference,
-            background: view.background,
-            coat: view.coat,
-            silhouette: &silhouette,
-            mean_gap: mean_gap(&difference),
-            around: &[],
-        };
-        let solid = cut.animal(2 * BAND_PX);
-        margin_px *= 2;
-        if !reaches_edge(&solid, frame) || f64::from(margin_px) > length_px {
-            break Seen {
-                difference,
-                silhouette,
-                solid,
-            };
-        }
-    };
+    let seen = Seen::first(view, silhouette, length_px);
     let matte = painted(&seen.difference, view.background, &seen.solid);
-    CutOut {
+    Pulled {
         matte,
         seen: Some(seen),
     }
@@ -129,18 +107,6 @@ fn painted(difference: &Difference, background: &Background, solid: &Mask) -> Ma
         pixel.copy_from_slice(&rgba);
     }
     cropped(rect, &image)
-}
-
-/// Returns whether a mask reaches an edge of its box that is none of the frame.
-fn reaches_edge(mask: &Mask, frame: &Frame) -> bool {
-    let (rect, w, h) = (mask.rect, mask.width(), mask.height());
-    let is_set = |x: usize, y: usize| mask.bits[y * w + x] == 1;
-    let side = |x: usize| (0..h).any(|y| is_set(x, y));
-    let row = |y: usize| (0..w).any(|x| is_set(x, y));
-    rect.x > 0 && side(0)
-        || rect.y > 0 && row(0)
-        || rect.right() < frame.width && side(w - 1)
-        || rect.bottom() < frame.height && row(h - 1)
 }
 
 /// Returns the matte in the smallest box with all its pixels that are not transparent.

@@ -1,17 +1,18 @@
-//! The second cut of a frame, with the cuts of the frames around it.
+//! The first cut of a frame, and the second one with the cuts of the frames around it.
 //!
 //! What one frame does not decide, the frames around it do: a snout as bright as the floor, a crumb of bedding.
 //! Each of their cuts, moved and turned onto this frame's, counts as one observation of each pixel.
 
+use super::around::{Around, Shape};
 use super::coat::Coat;
 use super::cut::{Cut, mean_gap};
-use super::{BAND_PX, Matte, painted};
+use super::{BAND_PX, MARGIN_PX, Matte, View, over_box, painted};
 use crate::analysis::pose::moments;
 use crate::analysis::scene::background::Background;
-use crate::analysis::silhouette::Difference;
+use crate::analysis::silhouette::{self, Difference};
 use crate::analysis::track::body;
-use crate::geometry::{Rect, wrap_rad};
-use crate::raster::{Mask, RgbImage};
+use crate::geometry::Rect;
+use crate::raster::{Frame, Mask, RgbImage};
 use crate::scratch::{Full, Scratch};
 
 /// A frame around the animal, with its first cut.
@@ -30,56 +31,36 @@ pub struct Stored {
     at: u64,
 }
 
-/// The animal by the first cut of a frame.
-pub struct Shape {
-    seen: Seen,
-    /// Centroid of the body, pixels.
-    centroid_px: [f64; 2],
-    /// Length axis of the body; `None` when it is round.
-    axis_rad: Option<f64>,
-}
-
-/// The animal in a frame, seen from another frame.
-pub struct Around<'a> {
-    shape: &'a Shape,
-    /// Centroid of the body in the other frame, pixels.
-    from_px: [f64; 2],
-    /// Cosine and sine of the turn from the other frame to this one.
-    turn: [f64; 2],
-}
-
-impl Shape {
-    /// Returns this shape, seen from another frame. An axis has no ends, so it turns by a quarter at most.
-    pub fn from_frame_of(&self, other: &Shape) -> Around<'_> {
-        let turn = other.axis_rad.zip(self.axis_rad);
-        let turn = turn.map_or(0.0, |(from, to)| 0.5 * wrap_rad(2.0 * (to - from)));
-        Around {
-            shape: self,
-            from_px: other.centroid_px,
-            turn: [libm::cos(turn), libm::sin(turn)],
+impl Seen {
+    /// Cuts the animal out the first time.
+    pub(super) fn first(view: &View, silhouette: &Mask, length_px: f64) -> Seen {
+        let frame = view.frame;
+        let mut margin_px = MARGIN_PX;
+        loop {
+            let rect = (silhouette.rect).inflated(margin_px, frame.width, frame.height);
+            let mut difference = silhouette::difference(frame, view.background, view.light, rect);
+            (view.ignored.iter()).for_each(|ignored| difference.clear(*ignored));
+            let silhouette = over_box(silhouette, rect);
+            let cut = Cut {
+                difference: &difference,
+                background: view.background,
+                coat: view.coat,
+                silhouette: &silhouette,
+                mean_gap: mean_gap(&difference),
+                around: &[],
+            };
+            let solid = cut.animal(2 * BAND_PX);
+            margin_px *= 2;
+            if !reaches_edge(&solid, frame) || f64::from(margin_px) > length_px {
+                break Seen {
+                    difference,
+                    silhouette,
+                    solid,
+                };
+            }
         }
     }
-}
 
-impl Around<'_> {
-    /// Returns whether a pixel of a box of the other frame shows the animal here, and its color; `None` outside.
-    pub(super) fn at(&self, rect: Rect, k: usize) -> Option<(bool, [u8; 3])> {
-        let width = rect.w as usize;
-        let dx = f64::from(rect.x) + (k % width) as f64 + 0.5 - self.from_px[0];
-        let dy = f64::from(rect.y) + (k / width) as f64 + 0.5 - self.from_px[1];
-        let ([cos, sin], [to_x, to_y]) = (self.turn, self.shape.centroid_px);
-        let seen = &self.shape.seen;
-        let own = seen.solid.rect;
-        let x = to_x + cos * dx - sin * dy - f64::from(own.x);
-        let y = to_y + sin * dx + cos * dy - f64::from(own.y);
-        let is_inside = x >= 0.0 && y >= 0.0 && x < f64::from(own.w) && y < f64::from(own.h);
-        let at = is_inside.then(|| y as usize * own.w as usize + x as usize)?;
-        let color = [0, 1, 2].map(|c| seen.difference.rgb.pixels[3 * at + c]);
-        Some((seen.solid.bits[at] == 1, color))
-    }
-}
-
-impl Seen {
     /// Stores the frame around the animal.
     pub fn put(&self, scratch: &dyn Scratch) -> Result<Stored, Full> {
         let mut bytes = self.difference.rgb.pixels.clone();
@@ -120,7 +101,8 @@ impl Seen {
         let opaque: Vec<u8> = body.bits.iter().map(|bit| 255 * bit).collect();
         let moments = moments::moments(body.rect, &opaque)?;
         Some(Shape {
-            seen: self,
+            solid: self.solid,
+            rgb: self.difference.rgb,
             centroid_px: moments.centroid_px,
             axis_rad: moments.major_rad,
         })
@@ -139,4 +121,16 @@ impl Seen {
         let solid = cut.animal(2 * BAND_PX);
         (solid != self.solid).then(|| painted(&self.difference, background, &solid))
     }
+}
+
+/// Returns whether a mask reaches an edge of its box that is none of the frame.
+fn reaches_edge(mask: &Mask, frame: &Frame) -> bool {
+    let (rect, w, h) = (mask.rect, mask.width(), mask.height());
+    let is_set = |x: usize, y: usize| mask.bits[y * w + x] == 1;
+    let side = |x: usize| (0..h).any(|y| is_set(x, y));
+    let row = |y: usize| (0..w).any(|x| is_set(x, y));
+    rect.x > 0 && side(0)
+        || rect.y > 0 && row(0)
+        || rect.right() < frame.width && side(w - 1)
+        || rect.bottom() < frame.height && row(h - 1)
 }

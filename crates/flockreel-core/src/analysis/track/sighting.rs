@@ -124,7 +124,7 @@ impl FrameView<'_> {
         let rect = shape.component.rect;
         let length_px = libm::hypot(f64::from(rect.w), f64::from(rect.h));
         let silhouette = &shape.silhouette;
-        let matte::CutOut { matte, seen } = matte::pull(&self.view, silhouette, length_px);
+        let matte::Pulled { matte, seen } = matte::pull(&self.view, silhouette, length_px);
         let Some(measured) = Sighting::measured(matte.rect, &matte.image) else {
             return Ok(None);
         };

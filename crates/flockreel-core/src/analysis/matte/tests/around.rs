@@ -34,7 +34,7 @@ fn mended(scene: &Scene) -> Seen {
 fn frames_around_show_what_one_frame_does_not() {
     let scene = Scene::with(|_, _| PAPER, whole);
     let front = [54, 33];
-    let CutOut { matte, seen } = scene.cut(bitten);
+    let Pulled { matte, seen } = scene.cut(bitten);
     let alone = pixel_of(&matte, front)[3];
     assert!(alone < 128, "the frame alone: {alone}");
     let own = scene.cut(bitten).seen.and_then(Seen::shape);

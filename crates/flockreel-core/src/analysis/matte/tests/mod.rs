@@ -6,6 +6,7 @@ mod dark_wall;
 use super::*;
 use crate::analysis::Params;
 use crate::analysis::scene::background::Background;
+use crate::analysis::silhouette;
 use crate::raster::{ColorSpec, RgbImage};
 
 const SIZE: [u32; 2] = [120, 90];
@@ -65,7 +66,7 @@ impl Scene {
         }
     }
 
-    fn cut(&self, shade: fn(u32, u32) -> u8) -> CutOut {
+    fn cut(&self, shade: fn(u32, u32) -> u8) -> Pulled {
         let view = View {
             frame: &picture(shade),
             background: &self.background,
