@@ -156,5 +156,7 @@ async fn worker_killed_during_a_job_changes_no_result() {
     let in_two_hours = SystemTime::now() + Duration::from_secs(7200);
     store.sweep(in_two_hours).await.unwrap();
     assert_eq!(store.check(now_ms()).await.unwrap(), Vec::<String>::new());
-    assert_eq!(store.blobs().folders().await.unwrap().len(), 1 + jobs.len());
+    let mut folders = store.blobs().folders().await.unwrap();
+    folders.retain(|folder| !folder.name.starts_with("views/"));
+    assert_eq!(folders.len(), 1 + jobs.len());
 }

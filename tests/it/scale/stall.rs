@@ -39,9 +39,15 @@ async fn worker_stalled_past_its_lease_overwrites_nothing() {
     let (account, mut ids) = (Account::local(), IdSequence::random());
     let queued = context.enqueue(&input, None, &account, &mut ids);
     let (job, library) = queued.await.unwrap();
+    // The views are made later, by another job.
     let stored = async || {
         let row = store.resource::<Library>(library.0, &OwnerFilter::All);
-        row.await.unwrap()
+        row.await.unwrap().map(|library| Library {
+            views_state: None,
+            views_folder: None,
+            size_bytes: 0,
+            ..library
+        })
     };
 
     let machine = place.second_machine();
@@ -66,7 +72,9 @@ async fn worker_stalled_past_its_lease_overwrites_nothing() {
     };
     wait_until("the stalled worker ends the job", ends).await;
     let log = stalled.log();
-    assert!(!log.contains("job done"), "{log}");
+    let job_name = job.0.to_string();
+    let mut done = log.lines().filter(|line| line.contains("job done"));
+    assert!(!done.any(|line| line.contains(&job_name)), "{log}");
     assert_eq!(stalled.terminate(), Some(0));
     assert_eq!(fresh.terminate(), Some(0));
 
@@ -74,11 +82,9 @@ async fn worker_stalled_past_its_lease_overwrites_nothing() {
     let folder = &kept.as_ref().unwrap().folder;
     assert!(finished.attempt == 2 && folder.ends_with(".2"), "{folder}");
     assert_eq!(stored().await, kept);
-    assert_eq!(
-        store.blobs().folders().await.unwrap().len(),
-        2,
-        "a footage and a library"
-    );
+    let mut folders = store.blobs().folders().await.unwrap();
+    folders.retain(|folder| !folder.name.starts_with("views/"));
+    assert_eq!(folders.len(), 2, "a footage and a library");
     assert_eq!(machine.n_drafts(), 0);
     assert_eq!(store.check(now_ms()).await.unwrap(), Vec::<String>::new());
 }
