@@ -3,7 +3,7 @@
 import { element, releaseVideo } from "../app/element.js";
 import { isCalm } from "../app/motion.js";
 import { filmName } from "../app/names.js";
-import { watchViews } from "../app/views.js";
+import { watchViews } from "../app/jobs.js";
 import { say, seconds } from "../app/words.js";
 import { living, loadPictures } from "./living.js";
 
@@ -37,12 +37,13 @@ export async function showFlock(stage, { library, planning, life, links }) {
   if (life.aborted) return;
   stage.style.setProperty("--ratio", String(plan.sizePx[0] / plan.sizePx[1]));
   const film = element("video", { poster: `${base}/poster.jpg`, muted: true, loop: true, playsInline: true, "aria-label": say("home.film") });
-  const words = element("figcaption", { role: "status" });
-  const one = element("figure.hero-one", {}, film, words);
+  const words = element("span", { role: "status" });
+  const figcaption = element("figcaption", {}, words);
+  const one = element("figure.hero-one", {}, film, figcaption);
   watchViews(library, life, (state) => {
     words.textContent = state === "done" ? say("hero.one", { time: seconds(Math.round(library.n_frames / library.fps)) }) : say(`views.${state}`);
-    if (state !== "done") return void (words.dataset.views = state);
-    delete words.dataset.views;
+    if (state !== "done") return void (figcaption.dataset.views = state);
+    delete figcaption.dataset.views;
     film.autoplay = flock.player.isPlaying && !isCalm();
     film.src = `${base}/film.mp4`;
   });
