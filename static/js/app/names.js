@@ -1,7 +1,7 @@
-// Names of films, for jobs and flocks that only know an id.
+// Names of films, for jobs and flocks that only know an id, and the state of their videos.
 // @ts-check
 import { get, list } from "./api.js";
-import { jobs, resultOf, subjectIdOf } from "./jobs.js";
+import { expect, isUnderWay, jobs, resultOf, subjectIdOf } from "./jobs.js";
 import { say } from "./words.js";
 
 /** @type {Map<string, Promise<Api.Things[keyof Api.Things]>>} */
@@ -77,3 +77,38 @@ export async function subjectOf(job) {
 
 /** Returns the library of a flock, null if it was deleted. Fails if the service does not answer. @param {Api.Flock} flock */
 export const libraryOf = (flock) => existing("libraries", flock.library_id);
+
+// The views of a library: film.mp4 and overlay.mp4, which a job makes after the library.
+
+/** Names of the files. */
+export const VIEWS = ["film.mp4", "overlay.mp4"];
+
+/** @typedef {Api.Library["views"]["state"]} State `making`, `done` or `failed` */
+
+/** Returns the state of the views of a library, as far as it is known. @param {Api.Library} library @returns {State} */
+export function viewsState({ views }) {
+  const job = views.state === "done" ? null : jobs.value.find(({ id }) => id === views.job_id);
+  if (!job) return views.state;
+  return isUnderWay(job) ? "making" : job.state === "done" ? "done" : "failed";
+}
+
+/**
+ * Tells the state of the views of a library at once and after each change, until they are done.
+ * @param {Api.Library} library @param {AbortSignal} life @param {(state: State) => void} tell
+ */
+export function watchViews(library, life, tell) {
+  const over = new AbortController();
+  let told = "";
+  const hear = () => {
+    const state = viewsState(library);
+    if (state === told) return;
+    told = state;
+    if (state === "done") over.abort();
+    tell(state);
+  };
+  hear();
+  if (told === "done" || !library.views.job_id) return;
+  jobs.watch(hear, AbortSignal.any([life, over.signal]));
+  // The library may be older than the last event of the job.
+  expect(library.views.job_id).catch(() => {});
+}

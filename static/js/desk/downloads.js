@@ -1,7 +1,7 @@
 // The files of a library in a table: name, use, size. The views have a state while they are made.
 // @ts-check
 import { element } from "../app/element.js";
-import { VIEWS, watchViews } from "../app/jobs.js";
+import { VIEWS, watchViews } from "../app/names.js";
 import { sayOr, say, size } from "../app/words.js";
 
 /** Files that follow from the poses and the scale. The service computes them when they are asked for, so it does not list them. */

@@ -1,7 +1,7 @@
 // Pictures of the animal in single frames: sprites of the atlas, or cuts out of the film where there is no atlas.
 // @ts-check
 import { releaseVideo } from "../app/element.js";
-import { viewsState } from "../app/jobs.js";
+import { viewsState } from "../app/names.js";
 import { loadAtlas } from "../flock/atlas.js";
 import { hasFile } from "./instrument.js";
 

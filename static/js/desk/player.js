@@ -3,7 +3,7 @@
 // @ts-check
 import { element, releaseVideo } from "../app/element.js";
 import { signal } from "../app/store.js";
-import { viewsState, watchViews } from "../app/jobs.js";
+import { viewsState, watchViews } from "../app/names.js";
 import { say } from "../app/words.js";
 
 /** Time that is played before and after the cut of a jump, s. */

@@ -3,7 +3,7 @@
 // Until there is a film, the pictures show the background.
 // @ts-check
 import { element, releaseVideo } from "../app/element.js";
-import { watchViews } from "../app/jobs.js";
+import { watchViews } from "../app/names.js";
 import { colorsAt, loadPicture } from "./canvas.js";
 import { drawMarks } from "./marks.js";
 

@@ -2,7 +2,7 @@
 // @ts-check
 import { element } from "../app/element.js";
 import { isCalm } from "../app/motion.js";
-import { watchViews } from "../app/jobs.js";
+import { watchViews } from "../app/names.js";
 import { say } from "../app/words.js";
 import { timeline } from "../parts/timeline.js";
 import { film } from "../reel/film.js";

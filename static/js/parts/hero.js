@@ -2,8 +2,7 @@
 // @ts-check
 import { element, releaseVideo } from "../app/element.js";
 import { isCalm } from "../app/motion.js";
-import { filmName } from "../app/names.js";
-import { watchViews } from "../app/jobs.js";
+import { filmName, watchViews } from "../app/names.js";
 import { say, seconds } from "../app/words.js";
 import { living, loadPictures } from "./living.js";
 
