@@ -28,7 +28,7 @@ from table import table
 
 # Interval between two looks at the job and at the memory, seconds. Stages that are shorter may be missed. Free choice.
 LOOK_S = 0.05
-# What the page asks for when a film is measured (static/js/places/film.js).
+# Plan of the flock that the page asks for when a film is measured (static/js/places/film.js).
 FLOCK = {"frames": 300}
 PLAN = "application/vnd.flockreel.plan"
 TOTAL = "drop to living flock"

@@ -34,7 +34,7 @@ pub enum Error {
         cause: analysis::Error,
         /// The frames that show the reason, JPEG.
         picture: Option<Vec<u8>>,
-        /// What may mend it.
+        /// Changes of the request that may mend it, the most promising first.
         mends: Vec<Mend>,
     },
     /// The flock could not be made.
@@ -95,7 +95,7 @@ pub struct FailedAttempt {
     pub is_transient: bool,
     /// The frames that show the reason, JPEG.
     pub picture: Option<Vec<u8>>,
-    /// What may mend it.
+    /// Changes of the request that may mend it, the most promising first.
     pub mends: Vec<Mend>,
 }
 
@@ -134,7 +134,7 @@ impl Error {
         }
     }
 
-    /// Returns what may mend the failure: changes of the request. Empty if nothing in the request does.
+    /// Returns the changes of the request that may mend the failure. Empty if none does.
     pub fn mends(&self) -> Vec<Mend> {
         match self {
             Error::Refused { mends, .. } => mends.clone(),

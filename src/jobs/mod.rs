@@ -22,7 +22,7 @@ pub mod concurrency; // limits of simultaneous work
 pub mod fish; // library -> virtual fish
 pub mod flock; // library -> flock
 pub mod masks; // footage -> given masks or alpha channel
-pub mod refusal; // refused footage -> picture of the reason, and what may mend it
+pub mod refusal; // refused footage -> picture of the reason, and mends
 pub mod sample; // nothing -> sample footage
 pub mod synchronous; // library -> computations during a request
 pub mod views; // library and its footage -> videos

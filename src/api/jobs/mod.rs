@@ -266,7 +266,7 @@ fn subject(row: &JobRow) -> Option<JobSubject> {
     row.subject_id().map(|id| JobSubject { kind, id })
 }
 
-/// Returns what may mend a failure. Older versions stored nothing of it.
+/// Returns the mends of a failure. Older versions stored none.
 fn mends_of(failure: &Failure) -> Vec<Mend> {
     let stored = failure.mends.as_deref();
     let stored = stored.and_then(|json| serde_json::from_str(json).ok());

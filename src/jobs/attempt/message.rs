@@ -111,7 +111,7 @@ pub(super) struct Failure {
     pub(super) sentence: String,
     /// Whether another attempt may succeed.
     pub(super) is_transient: bool,
-    /// What may mend it.
+    /// Changes of the request that may mend it, the most promising first.
     pub(super) mends: Vec<Mend>,
 }
 

@@ -1,4 +1,4 @@
-//! What may mend a refused film: parameters of the analysis, with proposed values where the film tells them, and files
+//! Mends: parameters of the analysis that may mend a refusal, with proposed values where the film tells them, and files
 //! beside the film. The page makes controls of them, the command line flags.
 
 use serde::{Deserialize, Serialize};
@@ -27,8 +27,8 @@ pub struct Mend {
     pub value: Value,
 }
 
-/// Returns the names of what may mend a failure with this code, the most promising first. Empty if nothing in the
-/// request does.
+/// Returns the names of the parameters and files that may mend a failure with this code, the most promising first. Empty
+/// if none does.
 pub fn names_for(code: Code) -> &'static [&'static str] {
     match code {
         Code::SeveralAnimals => &["animal_at", "follow"],
@@ -48,13 +48,13 @@ pub fn names_for(code: Code) -> &'static [&'static str] {
 }
 
 impl Mend {
-    /// Returns what may mend a failure of which only the code is known.
+    /// Returns the mends of a failure of which only the code is known.
     pub fn all_for(code: Code) -> Vec<Mend> {
         let names = names_for(code).iter();
         names.map(|name| Mend::new(name, Value::Null)).collect()
     }
 
-    /// Returns what may mend the refusal of a film that was measured with these parameters.
+    /// Returns the mends of a refusal, for a film that was measured with these parameters.
     pub fn all_of(cause: &analysis::Error, params: &Params, format: &FootageFormat) -> Vec<Mend> {
         let names = names_for(cause.code()).iter();
         names

@@ -1,4 +1,4 @@
-//! Refused footage: what may mend it, and `refused.jpg`, frames of the footage that show the reason
+//! Refused footage: its mends, and `refused.jpg`, frames of the footage that show the reason
 //! (docs/explanation/algorithms.md, "Refused footage").
 
 pub mod mend; // parameters that may mend it
@@ -13,7 +13,7 @@ use flockreel_core::raster::Frame;
 /// File name of the picture, also in URLs.
 pub const FILE_NAME: &str = "refused.jpg";
 
-/// Returns the error of an analysis with what may mend it, and with a picture if the footage shows the reason.
+/// Returns the error of an analysis with its mends, and with a picture if the footage shows the reason.
 pub fn explained(source: &dyn FrameSource, params: &Params, cause: analysis::Error) -> Error {
     let mends = Mend::all_of(&cause, params, &source.format());
     let picture = picture(source, &cause);

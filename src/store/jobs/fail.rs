@@ -5,12 +5,12 @@ use super::{Change, Lease};
 use crate::store::{Error, Store, sql};
 use flockreel_core::code::Code;
 
-/// What explains a failure besides its code and description.
+/// Explanation of a failure besides its code and description.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Shown<'a> {
     /// Frames that show the reason, JPEG.
     pub picture: Option<&'a [u8]>,
-    /// What may mend it, JSON.
+    /// List of changes of the request that may mend it, JSON.
     pub mends: Option<&'a str>,
 }
 

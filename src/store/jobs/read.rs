@@ -62,7 +62,7 @@ pub struct Failure {
     pub code: Code,
     /// Description of this failure.
     pub detail: String,
-    /// What may mend it, JSON. `None` if it was not stored.
+    /// List of changes of the request that may mend it, JSON. `None` if none was stored.
     pub mends: Option<String>,
     /// Parameters of a failed analysis, JSON.
     pub params: Option<String>,

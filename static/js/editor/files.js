@@ -4,7 +4,7 @@ import { request } from "../app/api.js";
 import { element } from "../app/element.js";
 import { say } from "../app/words.js";
 
-/** What may be chosen for each file. */
+/** Types of the files that can be chosen, for each parameter. */
 const ACCEPT = { background: "image/*", masks: "video/*,.zip,.tif,.tiff,.mkv,.avi" };
 
 /** @param {Api.Footage} film @param {import("../app/store.js").Signal<Record<string, File | null>>} files */

@@ -1,4 +1,4 @@
-// What may mend a refused film, as the service proposes it: each is a button that opens the editor at its control.
+// Mends of a refused film, as the service proposes them. Each is a button that opens the editor at its control.
 // @ts-check
 import { count, say, sayOr, seconds } from "../app/words.js";
 

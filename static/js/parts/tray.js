@@ -102,7 +102,7 @@ function buttonsOf(job, film) {
   if (!film || film.isGone) return [];
   if (job.state === "done") return job.kind === "sample" ? [] : [element("a.button.quiet", { href: addressOf(job) }, say("job.open")), ...(job.kind === "flock" ? filmButtons(resultOf(job)) : [])];
   const again = job.retriable ? [element("button.quiet", { type: "button", onclick: once(() => retry(job.id)) }, say("job.retry"))] : [];
-  // The place of a refused film has what mends it.
+  // The place of a refused film has its mends.
   if (job.kind === "analysis") return [...again, element("a.button.quiet", { href: `/films/${subjectIdOf(job)}` }, say(job.state === "failed" ? "job.mend" : "job.film"))];
   return job.kind === "flock" ? [...again, element("a.button.quiet", { href: `/libraries/${subjectIdOf(job)}/studio` }, say("reels.studio"))] : again;
 }

@@ -101,7 +101,7 @@ async function follow(job, parts) {
   }
 }
 
-/** Shows why the film was refused, with what may mend it. @param {import("../app/api.js").Problem} problem @param {Parts} parts */
+/** Shows why the film was refused, with its mends. @param {import("../app/api.js").Problem} problem @param {Parts} parts */
 function showRefusal(problem, parts) {
   parts.known.former = problem.params ?? {};
   const mends = mendsOf(problem, (mend) => edit(parts, (editor) => editor.openedBy(mend, problem)));

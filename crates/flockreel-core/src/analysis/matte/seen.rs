@@ -1,16 +1,14 @@
 //! The first cut of a frame, and the second one with the cuts of the frames around it.
 //!
-//! What one frame does not decide, the frames around it do: a snout as bright as the floor, a crumb of bedding.
-//! Each of their cuts, moved and turned onto this frame's, counts as one observation of each pixel.
+//! Some pixels look alike in animal and scene, such as a snout in its shadow or a crumb of bedding. The frames around
+//! decide them: each of their cuts, moved and turned onto this frame's, counts as one observation of each pixel.
 
 use super::around::{Around, Shape};
 use super::coat::Coat;
 use super::cut::{Cut, mean_gap};
 use super::{BAND_PX, MARGIN_PX, Matte, View, over_box, painted};
-use crate::analysis::pose::moments;
 use crate::analysis::scene::background::Background;
 use crate::analysis::silhouette::{self, Difference};
-use crate::analysis::track::body;
 use crate::geometry::Rect;
 use crate::raster::{Frame, Mask, RgbImage};
 use crate::scratch::{Full, Scratch};
@@ -95,17 +93,19 @@ impl Seen {
         }
     }
 
-    /// Returns the animal by the first cut; `None` if it has no pixels.
-    pub fn shape(self) -> Option<Shape> {
-        let body = body::without_thin_parts(&self.solid);
-        let opaque: Vec<u8> = body.bits.iter().map(|bit| 255 * bit).collect();
-        let moments = moments::moments(body.rect, &opaque)?;
-        Some(Shape {
+    /// Returns the pixels that show the animal by the first cut.
+    pub fn solid(&self) -> &Mask {
+        &self.solid
+    }
+
+    /// Returns the animal by the first cut, with the centroid and the length axis of its body.
+    pub fn shape(self, centroid_px: [f64; 2], axis_rad: Option<f64>) -> Shape {
+        Shape {
             solid: self.solid,
             rgb: self.difference.rgb,
-            centroid_px: moments.centroid_px,
-            axis_rad: moments.major_rad,
-        })
+            centroid_px,
+            axis_rad,
+        }
     }
 
     /// Cuts the animal out again, with the animal in the frames around; `None` where that changes nothing.

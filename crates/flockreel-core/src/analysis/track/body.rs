@@ -3,6 +3,7 @@
 //! The silhouette is opened by a share of its own greatest half width. A tail carried to one side turns the
 //! axis of all moments toward that side; the axis of the body is stable.
 
+use crate::analysis::pose::moments::{self, Moments};
 use crate::raster::Mask;
 use crate::raster::runs;
 
@@ -10,8 +11,15 @@ use crate::raster::runs;
 /// most accurate body axis. Above 0.3, a slender fish loses its own tail.
 const THIN_SHARE: f64 = 0.3;
 
+/// Returns the moments of a silhouette without its thin parts; `None` for an empty silhouette.
+pub(super) fn moments(silhouette: &Mask) -> Option<Moments> {
+    let body = without_thin_parts(silhouette);
+    let opaque: Vec<u8> = body.bits.iter().map(|bit| 255 * bit).collect();
+    moments::moments(body.rect, &opaque)
+}
+
 /// Returns the largest part of a silhouette without its thin parts; empty for an empty silhouette.
-pub(in crate::analysis) fn without_thin_parts(silhouette: &Mask) -> Mask {
+fn without_thin_parts(silhouette: &Mask) -> Mask {
     let depth = silhouette.depth_px();
     let half_width = depth.iter().copied().max().unwrap_or(0);
     let thin = (THIN_SHARE * f64::from(half_width)) as u32;

@@ -6,8 +6,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::Tracked;
 use super::sighting::Sighting;
+use super::{Tracked, body};
 use crate::analysis::Error;
 use crate::analysis::matte::{Seen, Shape};
 use crate::analysis::scene::Scene;
@@ -30,7 +30,7 @@ pub(super) fn all(
     for first in (0..frames.len()).step_by(BATCH) {
         let batch = first..(first + BATCH).min(frames.len());
         let near = around(&batch, frames.len());
-        let shape = |k: usize| Seen::get(frames[k].sighting.as_ref()?.seen?, scratch).shape();
+        let shape = |k: usize| shape(Seen::get(frames[k].sighting.as_ref()?.seen?, scratch));
         let shapes = Shapes {
             first: near.start,
             shapes: near.into_par_iter().map(shape).collect(),
@@ -47,6 +47,12 @@ pub(super) fn all(
         }
     }
     Ok(())
+}
+
+/// Returns the animal by the first cut; `None` if it has no pixels.
+fn shape(seen: Seen) -> Option<Shape> {
+    let body = body::moments(seen.solid())?;
+    Some(seen.shape(body.centroid_px, body.major_rad))
 }
 
 /// Returns the frames within reach of some.

@@ -74,9 +74,7 @@ impl Sighting {
         let solid = solid(rect, matte);
         let extent_px = |along_rad| moments::extent_px(&solid, along_rad);
         let quarter = std::f64::consts::FRAC_PI_2;
-        let body = body::without_thin_parts(&solid);
-        let opaque: Vec<u8> = body.bits.iter().map(|bit| 255 * bit).collect();
-        let body_rad = moments::moments(body.rect, &opaque).and_then(|body| body.major_rad);
+        let body_rad = body::moments(&solid).and_then(|body| body.major_rad);
         let along_body = body_rad.unwrap_or(axis);
         Some(Sighting {
             asymmetry: Asymmetry::measure(rect, matte, &moments),
