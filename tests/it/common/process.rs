@@ -75,6 +75,9 @@ impl WorkerProcess {
 
 impl Drop for WorkerProcess {
     fn drop(&mut self) {
+        if std::thread::panicking() {
+            eprintln!("the log of a worker:\n{}", self.log());
+        }
         // The process has already ended if the test passed.
         self.child.kill().ok();
         self.child.wait().ok();
