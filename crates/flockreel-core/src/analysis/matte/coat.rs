@@ -6,6 +6,8 @@
 use crate::analysis::palette::Palette;
 use crate::analysis::scene::background::Background;
 use crate::analysis::silhouette::Difference;
+use crate::analysis::track::body::THIN_SHARE;
+use crate::order;
 use crate::raster::Mask;
 
 /// Deviation of a frame from its background beside the noise of the pixel, such as that of a codec around a
@@ -15,6 +17,9 @@ const CODEC_NOISE: f32 = 3.0;
 const MIN_SHADOW: f32 = 0.3;
 /// Share of the scene near an animal that lies in shadow. Free choice.
 const SHADOW_SHARE: f32 = 0.1;
+/// Standard deviation of how much darker a shadow is in its middle than beside it, as far away as a thin part of
+/// the animal is wide, as a share of the background's brightness. Free choice.
+const SHADOW_DEPTH: f32 = 0.07;
 /// Share of the scene near an animal that moved. Free choice.
 const MOVED_SHARE: f32 = 0.01;
 
@@ -26,6 +31,8 @@ const COAT_DENSITY: f32 = 20.0;
 pub struct Coat {
     animal: Palette,
     scene: Palette,
+    /// Distance from a pixel to both sides of a thin part of the animal, pixels.
+    beside_px: i64,
     /// Whether the animal may extend beyond its silhouette. It may not where a part of the silhouette was cut
     /// off, such as a tether or a mirror image.
     pub grows: bool,
@@ -44,11 +51,22 @@ impl Coat {
                 pixels.map(move |k| (difference, background, k))
             })
         };
+        let half_widths = seen.iter().map(|(.., mask)| {
+            let depth = mask.depth_px();
+            depth.into_iter().max().map_or(0.0, f64::from)
+        });
+        let half_width = order::median(half_widths).unwrap_or(0.0);
+        let beside_px = (THIN_SHARE * half_width) as i64 + 1;
         let weighted = pixels(1).map(|(difference, background, k)| {
-            let scene = libm::expf(log_background(difference, background, k));
+            let scene = SceneAt {
+                difference,
+                background,
+            };
+            let scene = libm::expf(scene.log_light(k).max(scene.log_shadow(k)));
             (color(difference, k), COAT_DENSITY / (COAT_DENSITY + scene))
         });
         Coat {
+            beside_px,
             animal: Palette::weighted(weighted),
             scene: Palette::new(pixels(0).map(|(difference, _, k)| color(difference, k))),
             grows,
@@ -65,36 +83,108 @@ impl Coat {
     ) -> f32 {
         let color = color(difference, k);
         let moved = self.scene.log_density(color) + libm::logf(MOVED_SHARE);
-        self.animal.log_density(color) - log_background(difference, background, k).max(moved)
+        let scene = SceneAt {
+            difference,
+            background,
+        };
+        let scene = scene.log_density(k, self.beside_px).max(moved);
+        self.animal.log_density(color) - scene
     }
 }
 
-/// Returns the logarithm of the likelihood of a pixel's color under its background, in light or in shadow.
-fn log_background(difference: &Difference, background: &Background, k: usize) -> f32 {
-    let px = background.px_in(difference.rect, k);
-    let (seen, back) = (color(difference, k), background.color(px));
-    let variance = background.sigma[px].powi(2) + CODEC_NOISE.powi(2);
-    // Width of the distribution of a channel as a share of all levels.
-    let width = (std::f32::consts::TAU * variance).sqrt() / 256.0;
-    let log_density =
-        |off_squared: f32, volume: f32| -0.5 * off_squared / variance - libm::logf(volume);
-    let other = background.other.as_ref();
-    let sway = other.map_or([0.0; 3], |other| {
-        let at = &other.pixels[3 * px..3 * px + 3];
-        [0, 1, 2].map(|c| f32::from(at[c]) - back[c])
-    });
-    let sway_squared = dot(sway, sway);
-    let off = minus(seen, back);
-    let share = (dot(off, sway) / sway_squared.max(1.0)).clamp(0.0, 1.0);
-    let off = minus(off, sway.map(|c| share * c));
-    let length = width + sway_squared.sqrt() / 256.0;
-    let in_light = log_density(dot(off, off), width * width * length);
-    let light = dot(back, back);
-    let ratio = (dot(seen, back) / light.max(1.0)).clamp(MIN_SHADOW, 1.0);
-    let off = minus(seen, back.map(|c| ratio * c));
-    let length = width.max((1.0 - MIN_SHADOW) * light.sqrt() / 256.0);
-    let in_shadow = log_density(dot(off, off), width * width * length / SHADOW_SHARE);
-    in_light.max(in_shadow)
+/// The scene at the pixels of a box.
+struct SceneAt<'a> {
+    difference: &'a Difference,
+    background: &'a Background,
+}
+
+impl SceneAt<'_> {
+    /// Returns the logarithm of the likelihood of a pixel's color under its background, in light or in soft shadow.
+    fn log_density(&self, k: usize, beside_px: i64) -> f32 {
+        let (light, shadow) = (self.log_light(k), self.log_shadow(k));
+        // Hard shadows are found by their place (`cast_shadow`).
+        let may_be_line = shadow > light && self.background.cast_shadow.is_none();
+        let line = may_be_line.then(|| self.line(k, beside_px));
+        light.max(shadow - line.unwrap_or(0.0))
+    }
+
+    fn variance(&self, px: usize) -> f32 {
+        self.background.sigma[px].powi(2) + CODEC_NOISE.powi(2)
+    }
+
+    /// Returns the width of the distribution of a channel as a share of all levels.
+    fn width(&self, px: usize) -> f32 {
+        (std::f32::consts::TAU * self.variance(px)).sqrt() / 256.0
+    }
+
+    /// Returns the logarithm of the likelihood of a pixel's color in the light of its background.
+    fn log_light(&self, k: usize) -> f32 {
+        let px = self.background.px_in(self.difference.rect, k);
+        let back = self.background.color(px);
+        let other = self.background.other.as_ref();
+        let sway = other.map_or([0.0; 3], |other| {
+            let at = &other.pixels[3 * px..3 * px + 3];
+            [0, 1, 2].map(|c| f32::from(at[c]) - back[c])
+        });
+        let sway_squared = dot(sway, sway);
+        let off = minus(color(self.difference, k), back);
+        let share = (dot(off, sway) / sway_squared.max(1.0)).clamp(0.0, 1.0);
+        let off = minus(off, sway.map(|c| share * c));
+        let length = self.width(px) + sway_squared.sqrt() / 256.0;
+        -0.5 * dot(off, off) / self.variance(px) - libm::logf(self.width(px).powi(2) * length)
+    }
+
+    /// Returns the logarithm of the likelihood of a pixel's color in a shadow.
+    fn log_shadow(&self, k: usize) -> f32 {
+        let px = self.background.px_in(self.difference.rect, k);
+        let back = self.background.color(px);
+        let light = dot(back, back).sqrt();
+        let ratio = self.brightness(k).clamp(MIN_SHADOW, 1.0);
+        let off = minus(color(self.difference, k), back.map(|c| ratio * c));
+        let length = self.width(px).max((1.0 - MIN_SHADOW) * light / 256.0);
+        -0.5 * dot(off, off) / self.variance(px)
+            - libm::logf(self.width(px).powi(2) * length / SHADOW_SHARE)
+    }
+
+    /// Returns the brightness of a pixel as a share of the background's.
+    fn brightness(&self, k: usize) -> f32 {
+        let px = self.background.px_in(self.difference.rect, k);
+        let back = self.background.color(px);
+        dot(color(self.difference, k), back) / dot(back, back).max(1.0)
+    }
+
+    /// Returns how unlikely a pixel is in a shadow because it lies on a dark line: the loss of log-likelihood.
+    ///
+    /// On a line, a pixel is darker than both sides, and the line goes on at one end. A shadow has soft edges, so it
+    /// is seldom a line.
+    fn line(&self, k: usize, beside_px: i64) -> f32 {
+        let rect = self.difference.rect;
+        let (width, height) = (i64::from(rect.w), i64::from(rect.h));
+        let (x, y) = (k as i64 % width, k as i64 / width);
+        let own = self.brightness(k);
+        let at = |px: i64, [dx, dy]: [i64; 2]| {
+            let (x, y) = (x + px * dx, y + px * dy);
+            let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
+            is_inside.then(|| self.brightness((y * width + x) as usize).min(1.0))
+        };
+        let pair = |px: i64, along: [i64; 2]| at(px, along).zip(at(-px, along));
+        let near_px = (beside_px + 1) / 2;
+        let depth = |across: [i64; 2]| {
+            let along = pair(near_px, [-across[1], across[0]]);
+            let goes_on = along.map(|(a, b)| (a - own).abs().min((b - own).abs()))?;
+            let sides = [near_px, beside_px]
+                .into_iter()
+                .filter_map(|px| pair(px, across));
+            let darker = sides.map(|(a, b)| a.min(b)).fold(0.0, f32::max);
+            // On an even slope, twice the change over half the distance.
+            Some(darker - own - 2.0 * goes_on)
+        };
+        let across = [[1, 0], [0, 1], [1, 1], [1, -1]].into_iter();
+        let depth = across.filter_map(depth).fold(0.0, f32::max);
+        let back = self.background.color(self.background.px_in(rect, k));
+        let noise = self.variance(self.background.px_in(rect, k)) / dot(back, back).max(1.0);
+        0.5 * depth.powi(2) / (SHADOW_DEPTH.powi(2) + noise)
+    }
 }
 
 /// Returns the color of a pixel of the box, levels of 255.
