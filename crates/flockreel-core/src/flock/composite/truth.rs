@@ -7,6 +7,7 @@
 //! All shares are integers, in 16384ths. The shares of occluders, individuals and background add up to
 //! exactly one in every pixel.
 
+use super::keypoints::{KeypointSource, N_KEYPOINTS, Points};
 use crate::geometry::Rect;
 use crate::raster::Mask;
 
@@ -50,6 +51,19 @@ pub struct Seen {
     pub amodal_area: u32,
     /// Share of its total alpha that lies in the picture and is not covered, 0..=1.
     pub visibility: f64,
+    /// Source of the points from head to tail.
+    pub keypoint_source: KeypointSource,
+    /// Keypoints (`keypoints::NAMES`); `None` if one was not measured.
+    pub keypoints: [Option<Keypoint>; N_KEYPOINTS],
+}
+
+/// A point of an animal's body in the film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Keypoint {
+    /// Position, which may lie beyond the picture.
+    pub px: [f64; 2],
+    /// Whether the point lies in the picture, and nearer animals and occluders leave at least half of its pixel.
+    pub is_visible: bool,
 }
 
 /// Alpha with which an individual was drawn, in 16384ths, over a box.
@@ -62,6 +76,8 @@ pub(super) struct Drawn {
     pub(super) alpha: Vec<u16>,
     /// Extent without clipping; `None` if the sprite lies inside the picture.
     pub(super) whole: Option<FullExtent>,
+    pub(super) keypoint_source: KeypointSource,
+    pub(super) keypoints: Points,
 }
 
 /// Extent of an individual without clipping at the picture's border.
@@ -103,9 +119,26 @@ impl FrameTruth {
         truth
     }
 
+    /// Returns the keypoints of an individual. `left` is the share of each pixel that nearer ones leave.
+    fn keypoints(&self, points: Points, left: &[u16]) -> [Option<Keypoint>; N_KEYPOINTS] {
+        let [width, height] = self.size_px.map(f64::from);
+        let is_visible = |[x, y]: [f64; 2]| {
+            (0.0..width).contains(&x)
+                && (0.0..height).contains(&y)
+                && u32::from(left[y as usize * self.size_px[0] as usize + x as usize]) >= HALF
+        };
+        points.map(|point| {
+            point.map(|px| Keypoint {
+                px,
+                is_visible: is_visible(px),
+            })
+        })
+    }
+
     /// Labels the pixels of an individual, and takes its visible share from `left`.
     fn add(&mut self, drawn: &Drawn, left: &mut [u16]) -> Seen {
         let rect = drawn.rect;
+        let keypoints = self.keypoints(drawn.keypoints, left);
         let mut extent = Extent::default();
         let (mut visible_sum, mut visible_area) = (0, 0);
         let rows = drawn.alpha.chunks_exact(rect.w.max(1) as usize);
@@ -146,6 +179,8 @@ impl FrameTruth {
             amodal_box: whole.amodal_box,
             amodal_area: whole.amodal_area,
             visibility: visible_sum as f64 / whole.alpha_sum.max(1) as f64,
+            keypoint_source: drawn.keypoint_source,
+            keypoints,
         }
     }
 }
