@@ -87,6 +87,28 @@ impl SourceKeypoints {
     }
 }
 
+/// Returns the keypoints of every frame of the footage, in pixels of the footage, and the confidence of the pose; all
+/// `None` and 0 where the animal was not found.
+pub fn of_footage(library: &Library) -> impl Iterator<Item = (Points, f64)> {
+    let mut rgba = Vec::new();
+    library
+        .poses
+        .frames
+        .iter()
+        .enumerate()
+        .map(move |(frame, pose)| {
+            let Some(center) = pose.centroid_px else {
+                return (Points::default(), 0.0);
+            };
+            let (_, points) = of_frame(library, frame, &mut rgba);
+            let shifted = |[x, y]: [f64; 2]| [x + center[0], y + center[1]];
+            (
+                points.map(|point| point.map(shifted)),
+                pose.confidence.unwrap_or(1.0),
+            )
+        })
+}
+
 fn of_frame(library: &Library, frame: usize, rgba: &mut Vec<u8>) -> (KeypointSource, Points) {
     let mut points = Points::default();
     points[N_ALONG] = Some([0.0; 2]);

@@ -42,7 +42,8 @@ pub fn labels(task: Task, truth: &FrameTruth) -> String {
 
 /// Returns `data.yaml`. `splits` are the names of those subsets that have pictures.
 pub fn data_yaml(task: Task, splits: &[&str]) -> String {
-    let mut text = String::from("# A data set made by flockreel.\npath: .\n");
+    // Without a root, the loader takes the folder of the file.
+    let mut text = String::from("# A data set made by flockreel.\n");
     // A loader needs both; a set without the one takes the other.
     for (key, name) in [("train", "train"), ("val", "val"), ("test", "test")] {
         let other = splits.first().copied().unwrap_or(name);
