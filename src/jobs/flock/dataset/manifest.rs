@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::Dataset;
-use super::folder::{FolderError, Record};
+use super::files::Record;
 use crate::store::blobs::hex;
 use flockreel_core::dataset::{Ground, Params, Sequence, Split};
 use flockreel_core::formats::library_dir;
@@ -95,15 +95,18 @@ impl Manifest {
     }
 
     /// Reads the manifest of a folder; `None` if it has none.
-    pub fn read(folder: &Path) -> Result<Option<Manifest>, FolderError> {
-        match fs::read(folder.join(MANIFEST)) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
-            read => Ok(Some(serde_json::from_slice(&read?)?)),
-        }
+    pub fn read(folder: &Path) -> io::Result<Option<Manifest>> {
+        let bytes = match fs::read(folder.join(MANIFEST)) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            read => read?,
+        };
+        let read = serde_json::from_slice(&bytes);
+        read.map(Some)
+            .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
     }
 
     /// Returns the manifest of a folder if it holds this data set with all its files.
-    pub(super) fn finished_in(&self, folder: &Path) -> Result<Option<Manifest>, FolderError> {
+    pub(super) fn finished_in(&self, folder: &Path) -> io::Result<Option<Manifest>> {
         let found = Manifest::read(folder)?.filter(|found| found.request() == *self);
         Ok(found.filter(|found| found.files.iter().all(|file| file.is_in(folder))))
     }

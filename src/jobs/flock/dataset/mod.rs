@@ -4,20 +4,22 @@
 //! A flock is finished when its record is written. A data set that was stopped goes on with the first flock that
 //! has no record, so a stop redoes at most one flock.
 
-pub mod card; // README.md of the data set
-pub mod folder; // files with their hashes
+mod card; // README.md of the data set
+mod files; // files with their hashes
+pub mod folder; // the folder, with what a stopped run has finished
 pub mod manifest; // what the data set was made from
 mod picture; // one picture with its labels
+mod scene; // a flock that is ready to be drawn
 mod sequence; // all pictures of one flock
-pub mod sheet; // samples with the truth drawn over them
+mod sheet; // samples with the truth drawn over them
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use self::folder::{Folder, FolderError};
 use self::manifest::Manifest;
-use self::sequence::Scene;
-use super::super::Error;
+use self::scene::Scene;
+use crate::jobs::Error;
 use flockreel_core::dataset::{Params, Plan};
 use flockreel_core::library::Library;
 use flockreel_core::progress::Progress;
@@ -117,7 +119,7 @@ impl Dataset {
         progress: &dyn Progress,
     ) -> Result<Made, MakeError> {
         let n = self.plan.sequences.len();
-        if let Some(manifest) = manifest.finished_in(folder)? {
+        if let Some(manifest) = manifest.finished_in(folder).map_err(FolderError::Io)? {
             return Ok(Made {
                 manifest,
                 n_kept: n,

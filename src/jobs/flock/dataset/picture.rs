@@ -1,7 +1,8 @@
 //! One picture of a data set with its labels, in memory. Pictures are independent of each other, so all threads
 //! draw them.
 
-use super::sequence::Film;
+use super::files::WORK;
+use super::scene::Film;
 use flockreel_core::dataset::{Format, Picture};
 use flockreel_core::flock::Shot;
 use flockreel_core::flock::composite::truth::Seen;
@@ -84,6 +85,45 @@ impl Film<'_> {
             lines: texts.map(|text| self.lines(text, number, shot)).collect(),
             seen: std::mem::take(&mut shot.truth.seen),
         }
+    }
+
+    /// Returns the files to which every picture adds lines.
+    pub(super) fn texts(&self) -> Vec<Text> {
+        let formats = self.params().formats.iter();
+        formats
+            .flat_map(|&format| Text::of(format))
+            .copied()
+            .collect()
+    }
+
+    /// Returns the path of such a file in the data set.
+    pub(super) fn text_path(&self, text: Text) -> String {
+        let (folder, name) = (self.folder(), self.name());
+        match text {
+            Text::CocoImages => format!("{WORK}/{name}.images"),
+            Text::CocoAnnotations => format!("{WORK}/{name}.annotations"),
+            Text::Mot => format!("{folder}/gt/gt.txt"),
+            Text::Tracks => format!("{folder}/tracks.csv"),
+            Text::TracksDlc => format!("{folder}/tracks_dlc.csv"),
+            Text::Dlc => format!("{folder}/CollectedData_flockreel.csv"),
+        }
+    }
+
+    /// Returns the first lines of such a file.
+    pub(super) fn header(&self, text: Text) -> Vec<u8> {
+        let count = self.flock().individuals.len();
+        let mut header = Vec::new();
+        let written = match text {
+            Text::CocoImages | Text::CocoAnnotations | Text::Mot => Ok(()),
+            Text::Tracks => {
+                header = tracks::header().into_bytes();
+                Ok(())
+            }
+            Text::TracksDlc => dlc::write_header(&mut header, Layout::Predictions, count),
+            Text::Dlc => dlc::write_header(&mut header, Layout::Labels, count),
+        };
+        written.expect("writing to memory cannot fail");
+        header
     }
 
     /// Returns the lines of a picture in a file of the sequence.

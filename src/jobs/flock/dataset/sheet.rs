@@ -1,6 +1,6 @@
 //! Sheet of nine samples of a data set with the truth drawn over them, to be looked at before it is made.
 
-use super::sequence::Scene;
+use super::scene::Scene;
 use super::{Dataset, MakeError};
 use flockreel_core::flock::Shot;
 use flockreel_core::flock::composite::truth::FrameTruth;
