@@ -42,7 +42,7 @@ pub struct Args {
     #[arg(long, value_name = "WxH", value_parser = parse_size, help = set::parameter_help::<Params>("size_px"))]
     size: Option<[u32; 2]>,
     /// Label files, separated by commas: coco, mot, one of yolo_detect, yolo_segment and yolo_pose, dlc, tracks,
-    /// masks [default: coco mot yolo_pose tracks].
+    /// masks, depth [default: coco mot yolo_pose tracks].
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     formats: Option<Vec<String>>,
     /// Folder of background pictures (.png, .jpg). By default, half of the flocks then have one of them; `--set

@@ -8,6 +8,7 @@ import io
 import json
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import time
@@ -21,7 +22,7 @@ from conftest import run
 
 N_FLOCKS, N_PICTURES, EVERY = 5, 12, 3
 WISHES = ["library", "--flocks", str(N_FLOCKS), "--pictures", str(N_PICTURES), "--every", str(EVERY), "--count", "3", "9",
-          "--licence", "none", "--source", "a virtual fish", "--formats", "coco,mot,yolo_segment,tracks,masks,dlc"]
+          "--licence", "none", "--source", "a virtual fish", "--formats", "coco,mot,yolo_segment,tracks,masks,depth,dlc"]
 
 
 @pytest.fixture(scope="module")
@@ -120,6 +121,8 @@ def test_coco_agrees_with_masks_and_tracks(dataset, coco):
             path = pathlib.PurePath(image["file_name"])
             sequence = dataset / "sequences" / split / path.parent.name
             labels = np.array(Image.open(sequence / "masks" / f"{path.stem}.png"))
+            depth = np.array(Image.open(sequence / "depth" / f"{path.stem}.png"))
+            assert ((depth > 0) == (labels > 0)).all()
             rows = rows_of(sequence)
             assert image["frame"] == (int(path.stem) - 1) * EVERY
             found = annotations.loadAnns(annotations.getAnnIds(image["id"]))
@@ -127,6 +130,8 @@ def test_coco_agrees_with_masks_and_tracks(dataset, coco):
             for one in found:
                 assert (annotations.annToMask(one).astype(bool) == (labels == one["track_id"])).all()
                 row = rows[image["frame"], one["track_id"] - 1]
+                assert set(np.unique(depth[labels == one["track_id"]])) == {int(row["depth_rank"]) + 1}
+                assert one["depth_rank"] == int(row["depth_rank"])
                 names = annotations.cats[1]["keypoints"]
                 own = [[float(row[f"{name}_{k}"] or 0) for k in ("x_px", "y_px", "v")] for name in names]
                 np.testing.assert_allclose(np.reshape(one["keypoints"], (-1, 3)), own)
@@ -186,3 +191,27 @@ def test_yolo_outlines_are_the_masks(dataset):
                 n += 1
             assert not left.any()
     assert n > 20
+
+
+def test_commands_and_code_of_the_guide_work(folder, tmp_path):
+    guide = (pathlib.Path(__file__).parents[2] / "docs" / "how-to" / "train-a-tracker.md").read_text()
+    blocks = re.findall(r"```(sh|python)\n(.*?)```", guide, re.DOTALL)
+    make, vary, read, again = [text for _, text in blocks[:4]]
+    os.symlink(pathlib.Path(os.environ["FLOCKREEL_PROGRAM"]).resolve(), tmp_path / "flockreel")
+    os.symlink(folder / "film.mp4", tmp_path / "film.mp4")
+    # Fewer pictures take less time; the second block needs two films and a folder of pictures.
+    make = make.replace("--flocks 20 --pictures 100", "--flocks 3 --pictures 5")
+    vary = vary.replace("--flocks 200 --pictures 150", "--flocks 2 --pictures 3").replace("fish-a fish-b -o set", "library library -o other")
+    assert "--flocks 3" in make and "--flocks 2" in vary
+    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    shell = lambda text: subprocess.run(["sh", "-ec", text], cwd=tmp_path, env=environment, check=True, capture_output=True)
+    shell(make)
+    (tmp_path / "tanks").mkdir()
+    Image.open(tmp_path / "sheet.png").resize((640, 480)).save(tmp_path / "tanks" / "tank.jpg")
+    shell(vary)
+    shell(again)
+    assert same(tmp_path / "set", tmp_path / "again")
+    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(io.StringIO()):
+        found = {}
+        exec(read, found)
+    assert found["mask"].any() and set(found["visible"]) <= {0, 1, 2}

@@ -92,7 +92,7 @@ pub struct Params {
     pub split: [f64; 3],
     /// Label files to write. YOLO has one folder of labels, so at most one of its three kinds is possible.
     #[default(_code = "vec![Format::Coco, Format::Mot, Format::YoloPose, Format::Tracks]")]
-    #[schema(min_items = 1, max_items = 8)]
+    #[schema(min_items = 1, max_items = 16)]
     pub formats: Vec<Format>,
 }
 
@@ -154,6 +154,8 @@ pub enum Format {
     Tracks,
     /// Label pictures, as in the ground truth of a flock.
     Masks,
+    /// Depth order of each pixel.
+    Depth,
 }
 
 impl Format {

@@ -86,6 +86,10 @@ fn files(extension: &str, formats: &[Format]) -> Vec<(String, &'static str)> {
                 "sequences/SUBSET/FLOCK/masks/000001.png".to_owned(),
                 "16-bit gray: label of the individual visible in each pixel",
             )],
+            Format::Depth => vec![(
+                "sequences/SUBSET/FLOCK/depth/000001.png".to_owned(),
+                "16-bit gray: 1 for the nearest individual of the flock, 2 for the next, and so on; 0 = background",
+            )],
         });
     }
     files.push((

@@ -54,7 +54,11 @@ impl Text {
             Format::Mot => &[Text::Mot],
             Format::Tracks => &[Text::Tracks, Text::TracksDlc],
             Format::Dlc => &[Text::Dlc],
-            Format::Masks | Format::YoloDetect | Format::YoloSegment | Format::YoloPose => &[],
+            Format::Masks
+            | Format::Depth
+            | Format::YoloDetect
+            | Format::YoloSegment
+            | Format::YoloPose => &[],
         }
     }
 }
@@ -73,6 +77,12 @@ impl Film<'_> {
             let mask = picture::write_labels(width, height, &shot.truth.labels);
             let path = format!("{}/masks/{:06}.png", self.folder(), number + 1);
             files.push((path, mask));
+        }
+        if self.params().formats.contains(&Format::Depth) {
+            let [width, height] = shot.truth.size_px;
+            let depth = picture::write_labels(width, height, &shot.truth.depth_order());
+            let path = format!("{}/depth/{:06}.png", self.folder(), number + 1);
+            files.push((path, depth));
         }
         if let Some(task) = self.params().yolo() {
             let folder = self.picture_folder().replacen("images", "labels", 1);

@@ -297,14 +297,16 @@ mod tests {
                 })
                 .collect();
             for (id, seen) in shot.truth.seen.iter().enumerate() {
+                let is_nearer =
+                    |other: &usize| (depth(*other, frame), id) < (depth(id, frame), *other);
+                let n_nearer = (0..12).filter(is_nearer).count();
+                assert_eq!(seen.depth_rank as usize, n_nearer);
                 assert_eq!(seen.keypoint_source, KeypointSource::BodyEnds);
                 for point in seen.keypoints.iter().flatten() {
                     let [x, y] = point.px;
                     let is_inside = (0.0..320.0).contains(&x) && (0.0..240.0).contains(&y);
                     let left: f64 = (0..12)
-                        .filter(|&other| {
-                            (depth(other, frame), id) < (depth(id, frame), other) && is_inside
-                        })
+                        .filter(|other| is_inside && is_nearer(other))
                         .map(|other| 1.0 - alpha[other][y as usize * 320 + x as usize])
                         .product();
                     let is_tie = (left - 0.5).abs() < 0.01;

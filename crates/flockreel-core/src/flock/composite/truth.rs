@@ -51,6 +51,8 @@ pub struct Seen {
     pub amodal_area: u32,
     /// Share of its total alpha that lies in the picture and is not covered, 0..=1.
     pub visibility: f64,
+    /// Number of individuals that are nearer to the camera, in or out of the picture.
+    pub depth_rank: u32,
     /// Source of the points from head to tail.
     pub keypoint_source: KeypointSource,
     /// Keypoints (`keypoints::NAMES`); `None` if one was not measured.
@@ -108,8 +110,11 @@ impl FrameTruth {
             shadow: Vec::new(),
         };
         // Each individual takes its visible share from `left`; farther individuals get the rest.
-        for drawn in drawn {
-            truth.seen[drawn.id as usize] = truth.add(drawn, &mut left);
+        for (depth_rank, drawn) in (0..).zip(drawn) {
+            truth.seen[drawn.id as usize] = Seen {
+                depth_rank,
+                ..truth.add(drawn, &mut left)
+            };
         }
         let visible = |(&shade, &left): (&u16, &u16)| {
             ((u32::from(shade) * u32::from(left) / ONE * 255 + HALF) / ONE) as u8
@@ -133,6 +138,15 @@ impl FrameTruth {
                 is_visible: is_visible(px),
             })
         })
+    }
+
+    /// Returns the depth order of each pixel, by rows: `depth_rank` + 1 of the individual that has its label, or 0.
+    pub fn depth_order(&self) -> Vec<u16> {
+        let rank = |label: &u16| match label.checked_sub(1) {
+            Some(id) => self.seen[usize::from(id)].depth_rank as u16 + 1,
+            None => 0,
+        };
+        self.labels.iter().map(rank).collect()
     }
 
     /// Labels the pixels of an individual, and takes its visible share from `left`.
@@ -178,6 +192,7 @@ impl FrameTruth {
             },
             amodal_box: whole.amodal_box,
             amodal_area: whole.amodal_area,
+            depth_rank: 0,
             visibility: visible_sum as f64 / whole.alpha_sum.max(1) as f64,
             keypoint_source: drawn.keypoint_source,
             keypoints,
@@ -259,6 +274,7 @@ mod tests {
         assert_eq!(truth.seen[0].visibility, 1.0);
         assert_eq!(truth.seen[1].visible_box, Some(rect(0, 0, 2, 2)));
         assert_eq!(truth.seen[1].amodal_box, Some([0, 0, 4, 2]));
+        assert_eq!(truth.depth_order()[..8], [2, 2, 1, 1, 1, 1, 0, 0]);
         assert_eq!(
             (truth.seen[1].visible_area, truth.seen[1].amodal_area),
             (4, 8)

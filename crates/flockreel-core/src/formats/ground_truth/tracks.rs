@@ -12,7 +12,7 @@ use crate::geometry::rounded;
 /// The columns before the keypoints.
 const COLUMNS: &str = "frame,time_s,id,x_px,y_px,heading_rad,scale,depth_m,source_frame,mirrored,\
 rotation_rad,visible_x_px,visible_y_px,visible_w_px,visible_h_px,visible_area_px,amodal_x_px,amodal_y_px,\
-amodal_w_px,amodal_h_px,amodal_area_px,visibility,forward_x,forward_y,forward_z,keypoint_source";
+amodal_w_px,amodal_h_px,amodal_area_px,visibility,depth_rank,forward_x,forward_y,forward_z,keypoint_source";
 
 /// Returns the header line.
 pub fn header() -> String {
@@ -52,7 +52,12 @@ pub fn write_frame(
             Some([x, y, w, h]) => write!(out, "{x},{y},{w},{h},")?,
             None => out.write_all(b",,,,")?,
         }
-        write!(out, "{},{},", seen.amodal_area, rounded(seen.visibility, 4))?;
+        let visibility = rounded(seen.visibility, 4);
+        write!(
+            out,
+            "{},{visibility},{},",
+            seen.amodal_area, seen.depth_rank
+        )?;
         match individual.forward.as_ref().map(|all| all[frame_idx]) {
             Some([x, y, z]) => write!(out, "{x},{y},{z},")?,
             None => out.write_all(b",,,")?,
