@@ -87,6 +87,11 @@ def test_stopped_data_set_goes_on_and_keeps_finished_flocks(dataset, folder):
     assert json.loads(again.communicate()[0])["kept_flocks"] >= 2
     assert same(dataset, other)
     assert all(path.stat().st_mtime_ns == changed for path, changed in kept.items())
+    # A stop between the manifest and the end leaves a finished data set with leftovers.
+    (other / ".work").mkdir()
+    run(folder, "dataset", *WISHES, "-o", other)
+    assert same(dataset, other)
+    assert all(path.stat().st_mtime_ns == changed for path, changed in kept.items())
 
 
 def test_folder_with_other_files_is_refused(folder):

@@ -124,7 +124,7 @@ impl Folder {
         let card = write_hashed(&self.path, "README.md", card.as_bytes())?;
         manifest.files.push(card);
         self.write_whole(MANIFEST, &manifest.to_bytes()?)?;
-        fs::remove_dir_all(self.path.join(WORK))?;
+        clean(&self.path)?;
         Ok(manifest)
     }
 
@@ -174,6 +174,14 @@ impl Folder {
         let new = self.work("new");
         fs::write(&new, bytes)?;
         Ok(fs::rename(new, self.path.join(path))?)
+    }
+}
+
+/// Removes what only an unfinished data set needs. A stop may have left it in a finished one.
+pub(super) fn clean(path: &Path) -> Result<(), FolderError> {
+    match fs::remove_dir_all(path.join(WORK)) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        removed => Ok(removed?),
     }
 }
 

@@ -120,6 +120,7 @@ impl Dataset {
     ) -> Result<Made, MakeError> {
         let n = self.plan.sequences.len();
         if let Some(manifest) = manifest.finished_in(folder).map_err(FolderError::Io)? {
+            folder::clean(folder)?;
             return Ok(Made {
                 manifest,
                 n_kept: n,
