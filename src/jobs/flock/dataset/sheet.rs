@@ -10,7 +10,7 @@ use flockreel_core::raster::resize::resized;
 
 /// Number of columns and rows.
 const SIDE: usize = 3;
-/// Width and largest height of a cell, pixels. Free choice: the sheet then fits a screen.
+/// Largest width and height of a cell, pixels. Free choice: the sheet then fits a screen.
 const CELL_PX: [u32; 2] = [640, 480];
 /// Colors of outlines, by label. Free choice.
 const COLORS: [[u8; 3]; 6] = [
@@ -46,34 +46,30 @@ impl Dataset {
             samples.push((picture, shot.truth));
             progress.report("drawing samples", (cell + 1) as f64 / n_cells as f64);
         }
-        let heights = samples.iter().map(|(picture, _)| {
-            let height =
-                f64::from(CELL_PX[0]) * f64::from(picture.height) / f64::from(picture.width);
-            (height.round() as u32).clamp(1, CELL_PX[1])
-        });
-        let cell_px = [CELL_PX[0], heights.max().unwrap_or(CELL_PX[1])];
+        let sizes = samples.iter().map(|(picture, _)| fitted(picture.size()).1);
+        let cell_px = sizes.fold([1; 2], |cell, size| [0, 1].map(|k| size[k].max(cell[k])));
         let mut sheet = RgbImage::new(cell_px[0] * SIDE as u32, cell_px[1] * SIDE as u32);
         for (cell, (picture, truth)) in samples.iter().enumerate() {
             let corner = [
                 cell_px[0] * (cell % SIDE) as u32,
                 cell_px[1] * (cell / SIDE) as u32,
             ];
-            draw(&mut sheet, corner, cell_px, (picture, truth));
+            draw(&mut sheet, corner, picture, truth);
         }
         Ok(sheet)
     }
 }
 
-/// Draws a picture and its truth into a cell, as large as fits.
-fn draw(
-    sheet: &mut RgbImage,
-    [left, top]: [u32; 2],
-    cell_px: [u32; 2],
-    (picture, truth): (&RgbImage, &FrameTruth),
-) {
-    let [w, h] = truth.size_px.map(f64::from);
-    let scale = (f64::from(cell_px[0]) / w).min(f64::from(cell_px[1]) / h);
-    let size = [w, h].map(|side| ((side * scale) as u32).max(1));
+/// Returns the scale at which a picture fits a cell, and its size there.
+fn fitted([width, height]: [u32; 2]) -> (f64, [u32; 2]) {
+    let [w, h] = [f64::from(width), f64::from(height)];
+    let scale = (f64::from(CELL_PX[0]) / w).min(f64::from(CELL_PX[1]) / h);
+    (scale, [w, h].map(|side| ((side * scale) as u32).max(1)))
+}
+
+/// Draws a picture and its truth at a corner of the sheet, as large as fits a cell.
+fn draw(sheet: &mut RgbImage, [left, top]: [u32; 2], picture: &RgbImage, truth: &FrameTruth) {
+    let (scale, size) = fitted(truth.size_px);
     let shown = resized(picture, size[0], size[1]);
     let label = |x: u32, y: u32| {
         let [x, y] = [x, y].map(|at| ((f64::from(at) + 0.5) / scale) as u32);
