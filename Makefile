@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy programs unit scale-test race guards truth-test page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service hostile transitions swift page-bench screenshots count ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy programs unit scale-test race guards truth-test readers page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service hostile transitions swift page-bench screenshots count ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -64,8 +64,11 @@ race: target/vendor ## let eight processes race for 2000 jobs, on SQLite and on 
 	FLOCKREEL_RACE_JOBS=2000 $(CARGO) test --locked --test it -- --nocapture jobs::races
 	FLOCKREEL_RACE_JOBS=2000 scripts/with-servers.sh $(CARGO) test --locked --test it -- --nocapture jobs::races
 
-truth-test: programs ## read the ground truth of a flock with pycocotools and TrackEval
+truth-test: programs ## read the ground truth of flocks and data sets with pycocotools and TrackEval
 	$(TIMED) scripts/python-tests.sh truth $(DEBUG)
+
+readers: programs ## read keypoints and data sets with movement, sleap-io and the label check of ultralytics
+	$(TIMED) scripts/python-tests.sh readers $(DEBUG)
 
 page-types: programs ## check the types of the page's modules against the OpenAPI document
 	$(TIMED) python3 -B scripts/page-types.py $(DEBUG)

@@ -4,7 +4,9 @@
 # FLOCKREEL_SKIP="page contract truth" skips the named kinds.
 #
 #   scripts/python-tests.sh KIND PROGRAM     PROGRAM: the flockreel program to test; KIND:
-#       truth       tests/truth: reads the ground truth of a flock with pycocotools and TrackEval
+#       truth       tests/truth: reads the ground truth of flocks and data sets with pycocotools and TrackEval
+#       readers     tests/readers: reads keypoints and data sets with movement, sleap-io and the label check of
+#                   ultralytics; their packages take 2 GB
 #       page        tests/page-js: tests the page's modules in node; tests/page: tests the page of a running
 #                   service in Debian's chromium
 #       contract    tests/contract: runs schemathesis on the OpenAPI document of a running service; no
@@ -34,6 +36,15 @@ scripts/venv.sh "$venv" "tests/$kind/requirements.txt" || missing "their virtual
 export FLOCKREEL_PROGRAM="$program"
 case $kind in
 contract) set -- tests/contract/run.py "$program" ;;
+readers)
+    # Of ultralytics only the check of labels is needed, and the package would install PyTorch.
+    export FLOCKREEL_WHEELS="target/readers-wheels"
+    [ -e "$FLOCKREEL_WHEELS/ready" ] ||
+        "$venv/bin/python" -m pip download -q --no-deps -d "$FLOCKREEL_WHEELS" ultralytics==8.4.190 ||
+        missing "the wheel of ultralytics cannot be had here"
+    touch "$FLOCKREEL_WHEELS/ready"
+    set -- -m pytest -q -p no:cacheprovider -W ignore::DeprecationWarning tests/readers
+    ;;
 truth) set -- -m pytest -q -p no:cacheprovider -W ignore::DeprecationWarning tests/truth ;;
 page)
     # `make vendor` installs node from a wheel if the machine has none.

@@ -3,7 +3,7 @@
 # this list.
 #
 #   scripts/system-packages.sh GROUP...     GROUP: build | vendor | run | health | test | scale-test |
-#                                           truth-test | page-test | screenshots | contract-test | fuzz |
+#                                           truth-test | readers-test | page-test | screenshots | contract-test | fuzz |
 #                                           bench | arm-test
 #
 # Prints the packages that it installs. Uses sudo if it does not run as root. Exits with 1 if a package is
@@ -27,6 +27,8 @@ scale-test python3  python3-venv
 scale-test openssl  openssl
 truth-test python3  python3-venv
 truth-test ffmpeg   ffmpeg
+readers-test python3 python3-venv
+readers-test ffmpeg ffmpeg
 page-test python3   python3-venv
 page-test ffmpeg    ffmpeg
 contract-test python3 python3-venv

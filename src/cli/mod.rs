@@ -10,6 +10,7 @@ pub mod backup;
 pub mod check;
 pub mod check_plan;
 pub mod config_file;
+pub mod dataset;
 pub mod doctor;
 pub mod error;
 pub mod fish;
@@ -103,6 +104,8 @@ enum Command {
     Summary(library::summary::Args),
     /// Make a flock from a library and write it as a video.
     Flock(flock::Args),
+    /// Make a labelled data set of many flocks, for a detector or tracker.
+    Dataset(dataset::Args),
     /// Check the plan of a flock: every step, every cost, and that no cheaper plan exists.
     CheckPlan(check_plan::Args),
     /// Make a virtual fish that swims like the animal, as a video or a 3-D model.
@@ -190,6 +193,7 @@ fn run(command: Command, json: bool) -> Result<Option<Summary>, Error> {
         Command::Motion(args) => library::motion::run(args),
         Command::Summary(args) => library::summary::run(args, json),
         Command::Flock(args) => flock::run(args),
+        Command::Dataset(args) => dataset::run(args),
         Command::CheckPlan(args) => check_plan::run(args),
         Command::Fish(args) => fish::run(args),
         Command::Matrix(args) => library::matrix::run(args),

@@ -71,6 +71,13 @@ pub(super) fn parameter_help<P: Parameters>(name: &str) -> String {
     match &schema["default"] {
         Value::Null => {}
         Value::String(name) => help += &format!(" [default: {name}]"),
+        Value::Array(items) => {
+            let words = items.iter().map(|item| match item {
+                Value::String(word) => word.clone(),
+                other => other.to_string(),
+            });
+            help += &format!(" [default: {}]", words.collect::<Vec<_>>().join(" "));
+        }
         default => help += &format!(" [default: {default}]"),
     }
     let choices = schemas.choices(name);

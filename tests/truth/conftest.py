@@ -11,19 +11,26 @@ COUNT = 12
 
 
 @pytest.fixture(scope="session")
-def truth(tmp_path_factory):
-    """Folder written by `flockreel flock --ground-truth`, next to flock.json and flock.mp4."""
-    program = pathlib.Path(os.environ["FLOCKREEL_PROGRAM"]).resolve()
+def folder(tmp_path_factory):
+    """Folder with a library of the virtual fish."""
     folder = tmp_path_factory.mktemp("truth")
+    run(folder, "sample", "-o", "film.mp4", "--frames", "300")
+    run(folder, "analyze", "film.mp4", "-o", "library")
+    return folder
 
-    def run(*words):
-        subprocess.run([program, *words], cwd=folder, check=True, stderr=subprocess.DEVNULL)
 
-    run("sample", "-o", "film.mp4", "--frames", "300")
-    run("analyze", "film.mp4", "-o", "library")
-    run("flock", "library", "-o", "flock.mp4", "--plan", "flock.json", "--ground-truth", "truth", "--preset", "swarm",
+@pytest.fixture(scope="session")
+def truth(folder):
+    """Folder written by `flockreel flock --ground-truth`, next to flock.json and flock.mp4."""
+    run(folder, "flock", "library", "-o", "flock.mp4", "--plan", "flock.json", "--ground-truth", "truth", "--preset", "swarm",
         "--count", str(COUNT), "--frames", str(N_FRAMES))
     return folder / "truth"
+
+
+def run(folder, *words):
+    """Runs flockreel in a folder."""
+    program = pathlib.Path(os.environ["FLOCKREEL_PROGRAM"]).resolve()
+    subprocess.run([program, *words], cwd=folder, check=True, stderr=subprocess.DEVNULL)
 
 
 @pytest.fixture(scope="session")

@@ -26,3 +26,6 @@ pub mod analysis; // footage -> library
 pub mod fish; // poses -> virtual fish
 pub mod flock; // library -> flock
 pub mod formats; // values to bytes and back
+
+// A plan over several flocks, which also knows their formats.
+pub mod dataset; // libraries -> plan of a labelled data set

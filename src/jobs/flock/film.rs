@@ -116,7 +116,9 @@ impl Film<'_> {
         // Encoders start with the first frame. More frames are drawn while they start.
         let mut sinks = Vec::new();
         let begin = |target: &&Target| Sink::begin(target, shape, self.flock, self.is_clear());
-        let truth = pass.truth.map(|folder| TruthFolder::create(folder, shape));
+        let count = self.flock.individuals.len();
+        let length_px = self.flock.length_px * compositor.scale();
+        let truth = (pass.truth).map(|folder| TruthFolder::create(folder, shape, count));
         let mut truth = truth.transpose()?;
         let mut background = self.background_video()?;
         let n_wanted = targets.iter().map(|target| sink::n_wanted(target, shape));
@@ -152,7 +154,7 @@ impl Film<'_> {
             },
         )?;
         sinks.into_iter().try_for_each(Sink::finish)?;
-        Ok(truth.map_or(Ok(()), TruthFolder::finish)?)
+        Ok(truth.map_or(Ok(()), |truth| truth.finish(length_px))?)
     }
 
     /// Writes the middle frame as a picture.

@@ -3,6 +3,7 @@
 //! the `render` parameters request.
 
 mod background_video;
+pub mod dataset; // many flocks with labels
 pub mod film; // flock -> files
 mod sink; // encoders and pictures
 pub mod target; // files that can be made

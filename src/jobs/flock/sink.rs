@@ -154,7 +154,7 @@ fn png([width, height]: [u32; 2], alpha: bool, rgba: &[u8]) -> Vec<u8> {
     if alpha {
         picture::write_rgba(width, height, rgba)
     } else {
-        picture::write_rgb(&without_alpha(width, height, rgba))
+        picture::write_rgb(&RgbImage::without_alpha(width, height, rgba))
     }
 }
 
@@ -164,22 +164,11 @@ pub(super) fn poster(path: &Path, size_px: [u32; 2], alpha: bool, rgba: &[u8]) -
         .extension()
         .is_some_and(|extension| extension == "jpg" || extension == "jpeg");
     let bytes = if is_jpeg {
-        picture::write_jpeg(&without_alpha(size_px[0], size_px[1], rgba))
+        picture::write_jpeg(&RgbImage::without_alpha(size_px[0], size_px[1], rgba))
     } else {
         png(size_px, alpha, rgba)
     };
     fs::write(path, bytes)
-}
-
-fn without_alpha(width: u32, height: u32, rgba: &[u8]) -> RgbImage {
-    RgbImage {
-        width,
-        height,
-        pixels: rgba
-            .chunks_exact(4)
-            .flat_map(|p| [p[0], p[1], p[2]])
-            .collect(),
-    }
 }
 
 #[cfg(test)]

@@ -11,6 +11,8 @@ use super::sink::remove_frames;
 use flockreel_core::flock::Flock;
 use flockreel_core::flock::composite::truth::FrameTruth;
 use flockreel_core::formats::ground_truth::coco::Coco;
+use flockreel_core::formats::ground_truth::dlc::{self, Layout};
+use flockreel_core::formats::ground_truth::report::Report;
 use flockreel_core::formats::ground_truth::{FilmShape, README, frame_name, mot, tracks};
 use flockreel_core::formats::picture;
 
@@ -25,27 +27,36 @@ pub struct TruthFolder {
     coco: Coco<BufWriter<File>>,
     mot: BufWriter<File>,
     tracks: BufWriter<File>,
+    poses: BufWriter<File>,
+    report: Report,
     /// Index after the last shadow picture written.
     n_shadows: usize,
 }
 
 impl TruthFolder {
-    /// Starts a ground truth in a folder. Creates the folder if absent.
-    pub fn create(folder: &Path, film: FilmShape) -> io::Result<TruthFolder> {
+    /// Starts a ground truth of `count` individuals in a folder. Creates the folder if absent.
+    pub fn create(folder: &Path, film: FilmShape, count: usize) -> io::Result<TruthFolder> {
         fs::create_dir_all(folder.join(MASKS))?;
         fs::create_dir_all(folder.join("gt"))?;
         let file =
             |name: &str| Ok::<_, io::Error>(BufWriter::new(File::create(folder.join(name))?));
         fs::write(folder.join("README.txt"), README)?;
-        fs::write(folder.join("seqinfo.ini"), mot::sequence(&film))?;
+        fs::write(
+            folder.join("seqinfo.ini"),
+            mot::sequence(&film, "flock", "img1", "png"),
+        )?;
         let mut tracks = file("tracks.csv")?;
-        tracks.write_all(tracks::COLUMNS.as_bytes())?;
+        tracks.write_all(tracks::header().as_bytes())?;
+        let mut poses = file("tracks_dlc.csv")?;
+        dlc::write_header(&mut poses, Layout::Predictions, count)?;
         Ok(TruthFolder {
             folder: folder.to_owned(),
             film,
             coco: Coco::begin(file("coco.json")?, &film)?,
             mot: file("gt/gt.txt")?,
             tracks,
+            poses,
+            report: Report::default(),
             n_shadows: 0,
         })
     }
@@ -63,14 +74,22 @@ impl TruthFolder {
             self.n_shadows = frame_idx + 1;
         }
         self.coco.add(flock, frame_idx, truth)?;
+        let frame = frame_idx.to_string();
+        dlc::write_frame(&mut self.poses, Layout::Predictions, &frame, truth)?;
+        self.report.add(frame_idx, &truth.seen);
         mot::write_frame(&mut self.mot, flock, frame_idx, truth)?;
         tracks::write_frame(&mut self.tracks, flock, &self.film, frame_idx, truth)
     }
 
     /// Completes all files, and removes pictures that a longer earlier video has left.
-    pub fn finish(mut self) -> io::Result<()> {
+    ///
+    /// `length_px` is a body length in the film, pixels.
+    pub fn finish(mut self, length_px: f64) -> io::Result<()> {
         remove_frames(&self.folder.join(MASKS), self.film.n_frames)?;
         remove_frames(&self.folder.join(SHADOWS), self.n_shadows)?;
+        let report = self.report.json(self.film.n_frames, length_px);
+        fs::write(self.folder.join("report.json"), report)?;
+        self.poses.flush()?;
         self.coco.end()?;
         self.mot.flush()?;
         self.tracks.flush()

@@ -109,6 +109,8 @@ async fn assert_files(app: &TestApp, flock: &str) {
         "gt/gt.txt",
         "seqinfo.ini",
         "tracks.csv",
+        "tracks_dlc.csv",
+        "report.json",
     ] {
         assert!(names.iter().any(|found| found == name), "{name} {names:?}");
     }

@@ -25,6 +25,7 @@ pub(super) fn may_use(file: &str, module: &str, used: &str) -> bool {
             _ if MIDDLE.contains(&module) => within(&[VALUES, MIDDLE]),
             _ if ALGORITHMS.contains(&module) => within(&[VALUES, MIDDLE]),
             "formats" => within(&[VALUES, MIDDLE, ALGORITHMS]),
+            "dataset" => used == "formats" || within(&[VALUES, MIDDLE, ALGORITHMS]),
             "config" | "traces" => false,
             "logging" => used == "traces",
             "media" => ["raster", "footage", "progress", "code", "config"].contains(&used),

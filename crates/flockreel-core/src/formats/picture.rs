@@ -65,8 +65,13 @@ pub fn write_labels(width: u32, height: u32, labels: &[u16]) -> Vec<u8> {
 
 /// Returns an RGB image as JPEG, for posters.
 pub fn write_jpeg(image: &RgbImage) -> Vec<u8> {
+    write_jpeg_of(image, 90)
+}
+
+/// Returns an RGB image as JPEG of a quality from 1 to 100.
+pub fn write_jpeg_of(image: &RgbImage, quality: u8) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let mut encoder = JpegEncoder::new_with_quality(&mut bytes, 90);
+    let mut encoder = JpegEncoder::new_with_quality(&mut bytes, quality);
     encoder
         .encode(
             &image.pixels,

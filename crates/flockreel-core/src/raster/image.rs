@@ -17,6 +17,22 @@ pub type RgbImage = Image<3>;
 /// An RGBA image with straight (not premultiplied) alpha.
 pub type RgbaImage = Image<4>;
 
+impl RgbImage {
+    /// Returns the colors of RGBA pixels. Alpha is ignored. Panics unless there are `width * height * 4` bytes.
+    pub fn without_alpha(width: u32, height: u32, rgba: &[u8]) -> RgbImage {
+        let mut image = RgbImage::new(width, height);
+        assert_eq!(
+            rgba.len() / 4 * 3,
+            image.pixels.len(),
+            "4 bytes for each pixel"
+        );
+        for (rgb, rgba) in image.pixels.chunks_exact_mut(3).zip(rgba.chunks_exact(4)) {
+            rgb.copy_from_slice(&rgba[..3]);
+        }
+        image
+    }
+}
+
 impl<const N: usize> Image<N> {
     /// Returns an image of zeros: black, and transparent if it has alpha.
     pub fn new(width: u32, height: u32) -> Self {

@@ -1,6 +1,7 @@
 //! Drawing of one individual in one frame: its sprite, and around a jump a second sprite that fades in or
 //! out (docs/explanation/algorithms.md, "Compositing").
 
+use super::keypoints::SourceKeypoints;
 use super::morph::warp_together;
 use super::params::Cut;
 use super::sprite_cache::SpriteCache;
@@ -99,9 +100,16 @@ impl Painter {
         canvas.draw_sprite_under(&sprite, &place, cover, context.cpu)
     }
 
-    /// Returns the alpha of the layer drawn last, for the ground truth. May overwrite `layer`.
-    pub(super) fn drawn(&mut self, context: &DrawContext, appearance: &Appearance) -> Drawn {
+    /// Returns the alpha of the layer drawn last and the keypoints, for the ground truth. May overwrite `layer`.
+    pub(super) fn drawn(
+        &mut self,
+        context: &DrawContext,
+        appearance: &Appearance,
+        keypoints: &SourceKeypoints,
+    ) -> Drawn {
         let place = placement(context, appearance);
+        let shown = appearance.individual.source_frame[appearance.frame_idx];
+        let (keypoint_source, keypoints) = keypoints.placed(shown, &place);
         let mut drawn = Drawn {
             id: appearance.individual.id,
             centroid_px: place.center_px,
@@ -109,6 +117,8 @@ impl Painter {
             rect: self.layer.rect,
             alpha: self.layer.alpha(),
             whole: None,
+            keypoint_source,
+            keypoints,
         };
         if self.is_clipped(context) {
             drawn.whole = Some(self.whole(context, appearance));

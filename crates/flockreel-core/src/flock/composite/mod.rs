@@ -12,6 +12,7 @@
 mod backdrop; // the background of the film
 mod bleed; // color of transparent pixels
 mod draw_ahead; // drawing on all threads, ahead of the consumer
+pub mod keypoints; // head, midline and tail
 mod layer; // drawing of one individual
 mod morph; // warping of two sprites at a jump
 mod occluders; // occluders in front of the animals
@@ -26,6 +27,7 @@ use std::sync::{Mutex, PoisonError};
 use self::backdrop::Backdrop;
 use self::bleed::bleed;
 use self::draw_ahead::draw_ahead;
+use self::keypoints::SourceKeypoints;
 use self::layer::{Appearance, DrawContext, Haze, Painter};
 use self::occluders::Occluders;
 use self::params::Background;
@@ -46,7 +48,8 @@ pub struct Compositor<'a> {
     flock: &'a Flock,
     view: View,
     format: PixelFormat,
-    with_truth: bool,
+    /// Keypoints of the source frames; `None` without ground truth.
+    truth: Option<SourceKeypoints>,
     backdrop: Backdrop,
     haze: Option<Haze>,
     shadows: Option<Shadows>,
@@ -110,7 +113,7 @@ impl<'a> Compositor<'a> {
             flock,
             view,
             format,
-            with_truth: false,
+            truth: None,
             backdrop: Backdrop::new(background, library, &view, format),
             haze: (render.haze_per_bl > 0.0).then(|| Haze {
                 left_per_px: libm::pow(1.0 - render.haze_per_bl, 1.0 / flock.length_px),
@@ -136,7 +139,7 @@ impl<'a> Compositor<'a> {
 
     /// Makes the compositor also compute the ground truth of every frame.
     pub fn with_truth(mut self) -> Compositor<'a> {
-        self.with_truth = true;
+        self.truth = Some(SourceKeypoints::of(self.library, self.flock));
         self
     }
 
@@ -162,6 +165,11 @@ impl<'a> Compositor<'a> {
         self.view.size_px
     }
 
+    /// Returns the film pixels per footage pixel.
+    pub fn scale(&self) -> f64 {
+        self.view.scale
+    }
+
     /// Draws one frame into `shot`, reusing its memory. Panics beyond the last frame.
     pub fn render(&self, frame_idx: usize, shot: &mut Shot) {
         let mut workspace = self.take_workspace();
@@ -177,7 +185,7 @@ impl<'a> Compositor<'a> {
             workspace.shade.layer(&mut workspace.painter.layer);
             workspace.draw_layer(self.cpu);
         }
-        if self.with_truth {
+        if self.truth.is_some() {
             let shade = self.shadows.as_ref().map(|_| workspace.shade.alpha());
             shot.truth = FrameTruth::new(
                 &workspace.drawn,
@@ -303,7 +311,7 @@ impl<'a> Compositor<'a> {
     fn draw(&self, appearance: &Appearance, workspace: &mut Workspace) {
         let context = self.context();
         let outlines = self.shadows.as_ref().is_some_and(Shadows::are_outlines);
-        if self.with_truth || outlines {
+        if self.truth.is_some() || outlines {
             // The ground truth and outline shadows need whole sprites, hidden parts included.
             workspace.painter.paint(&context, appearance, None);
             workspace.draw_layer(self.cpu);
@@ -316,12 +324,11 @@ impl<'a> Compositor<'a> {
                 &mut workspace.shade,
             );
         }
-        if self.with_truth {
-            workspace
-                .drawn
-                .push(workspace.painter.drawn(&context, appearance));
+        if let Some(keypoints) = &self.truth {
+            let drawn = workspace.painter.drawn(&context, appearance, keypoints);
+            workspace.drawn.push(drawn);
         }
-        if self.with_truth || outlines {
+        if self.truth.is_some() || outlines {
             return;
         }
         let Workspace {

@@ -7,6 +7,7 @@
 //! All shares are integers, in 16384ths. The shares of occluders, individuals and background add up to
 //! exactly one in every pixel.
 
+use super::keypoints::{KeypointSource, N_KEYPOINTS, Points};
 use crate::geometry::Rect;
 use crate::raster::Mask;
 
@@ -50,6 +51,21 @@ pub struct Seen {
     pub amodal_area: u32,
     /// Share of its total alpha that lies in the picture and is not covered, 0..=1.
     pub visibility: f64,
+    /// Number of individuals that are nearer to the camera, in or out of the picture.
+    pub depth_rank: u32,
+    /// Source of the points from head to tail.
+    pub keypoint_source: KeypointSource,
+    /// Keypoints (`keypoints::NAMES`); `None` if one was not measured.
+    pub keypoints: [Option<Keypoint>; N_KEYPOINTS],
+}
+
+/// A point of an animal's body in the film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Keypoint {
+    /// Position, which may lie beyond the picture.
+    pub px: [f64; 2],
+    /// Whether the point lies in the picture, and nearer animals and occluders leave at least half of its pixel.
+    pub is_visible: bool,
 }
 
 /// Alpha with which an individual was drawn, in 16384ths, over a box.
@@ -62,6 +78,8 @@ pub(super) struct Drawn {
     pub(super) alpha: Vec<u16>,
     /// Extent without clipping; `None` if the sprite lies inside the picture.
     pub(super) whole: Option<FullExtent>,
+    pub(super) keypoint_source: KeypointSource,
+    pub(super) keypoints: Points,
 }
 
 /// Extent of an individual without clipping at the picture's border.
@@ -92,8 +110,11 @@ impl FrameTruth {
             shadow: Vec::new(),
         };
         // Each individual takes its visible share from `left`; farther individuals get the rest.
-        for drawn in drawn {
-            truth.seen[drawn.id as usize] = truth.add(drawn, &mut left);
+        for (depth_rank, drawn) in (0..).zip(drawn) {
+            truth.seen[drawn.id as usize] = Seen {
+                depth_rank,
+                ..truth.add(drawn, &mut left)
+            };
         }
         let visible = |(&shade, &left): (&u16, &u16)| {
             ((u32::from(shade) * u32::from(left) / ONE * 255 + HALF) / ONE) as u8
@@ -103,9 +124,35 @@ impl FrameTruth {
         truth
     }
 
+    /// Returns the keypoints of an individual. `left` is the share of each pixel that nearer ones leave.
+    fn keypoints(&self, points: Points, left: &[u16]) -> [Option<Keypoint>; N_KEYPOINTS] {
+        let [width, height] = self.size_px.map(f64::from);
+        let is_visible = |[x, y]: [f64; 2]| {
+            (0.0..width).contains(&x)
+                && (0.0..height).contains(&y)
+                && u32::from(left[y as usize * self.size_px[0] as usize + x as usize]) >= HALF
+        };
+        points.map(|point| {
+            point.map(|px| Keypoint {
+                px,
+                is_visible: is_visible(px),
+            })
+        })
+    }
+
+    /// Returns the depth order of each pixel, by rows: `depth_rank` + 1 of the individual that has its label, or 0.
+    pub fn depth_order(&self) -> Vec<u16> {
+        let rank = |label: &u16| match label.checked_sub(1) {
+            Some(id) => self.seen[usize::from(id)].depth_rank as u16 + 1,
+            None => 0,
+        };
+        self.labels.iter().map(rank).collect()
+    }
+
     /// Labels the pixels of an individual, and takes its visible share from `left`.
     fn add(&mut self, drawn: &Drawn, left: &mut [u16]) -> Seen {
         let rect = drawn.rect;
+        let keypoints = self.keypoints(drawn.keypoints, left);
         let mut extent = Extent::default();
         let (mut visible_sum, mut visible_area) = (0, 0);
         let rows = drawn.alpha.chunks_exact(rect.w.max(1) as usize);
@@ -145,7 +192,10 @@ impl FrameTruth {
             },
             amodal_box: whole.amodal_box,
             amodal_area: whole.amodal_area,
+            depth_rank: 0,
             visibility: visible_sum as f64 / whole.alpha_sum.max(1) as f64,
+            keypoint_source: drawn.keypoint_source,
+            keypoints,
         }
     }
 }
@@ -224,6 +274,7 @@ mod tests {
         assert_eq!(truth.seen[0].visibility, 1.0);
         assert_eq!(truth.seen[1].visible_box, Some(rect(0, 0, 2, 2)));
         assert_eq!(truth.seen[1].amodal_box, Some([0, 0, 4, 2]));
+        assert_eq!(truth.depth_order()[..8], [2, 2, 1, 1, 1, 1, 0, 0]);
         assert_eq!(
             (truth.seen[1].visible_area, truth.seen[1].amodal_area),
             (4, 8)

@@ -1,13 +1,18 @@
-//! coco.json in the COCO format: one annotation for each individual and frame in which it is visible. Track
-//! ids and other known values are additional fields (docs/reference/formats.md, "Ground truth").
+//! coco.json in the COCO format: one annotation for each individual and frame in which it is visible, with mask,
+//! box and keypoints. Track ids and other known values are additional fields (docs/reference/formats.md,
+//! "Ground truth").
+//!
+//! A data set joins the images and annotations of many flocks in one file.
 
 use std::io::{self, Write};
 
 use serde::Serialize;
+use serde_json::json;
 
-use super::{FilmShape, frame_name, rle, with_truth};
+use super::{FilmShape, flag, frame_name, rle, with_truth};
 use crate::flock::Flock;
-use crate::flock::composite::truth::{FrameTruth, Seen};
+use crate::flock::composite::keypoints::{N_KEYPOINTS, NAMES};
+use crate::flock::composite::truth::{FrameTruth, Keypoint, Seen};
 use crate::geometry::{Rect, rounded};
 
 /// Writes a coco.json.
@@ -16,22 +21,32 @@ pub struct Coco<W: Write> {
     n_annotations: u64,
 }
 
+/// A picture in the list `images`.
 #[derive(Serialize)]
-struct Image {
-    id: usize,
-    file_name: String,
-    width: u32,
-    height: u32,
-    frame: usize,
-    time_s: f64,
+pub struct Image {
+    /// Number, from 1.
+    pub id: u64,
+    /// Path of the picture.
+    pub file_name: String,
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
+    /// Frame of the flock, from 0.
+    pub frame: usize,
+    /// Time of the frame, seconds.
+    pub time_s: f64,
 }
 
+/// An individual in the list `annotations`.
 #[derive(Serialize)]
-struct Annotation {
-    id: u64,
-    image_id: usize,
+pub struct Annotation {
+    /// Number in the file, from 1.
+    pub id: u64,
+    image_id: u64,
     category_id: u32,
-    track_id: u32,
+    /// The label: the id of the individual plus 1.
+    pub track_id: u32,
     iscrowd: u32,
     area: u32,
     bbox: [u32; 4],
@@ -42,6 +57,12 @@ struct Annotation {
     amodal_segmentation: RunLengths,
     centroid_px: [f64; 2],
     heading_rad: f64,
+    forward: Option<[f64; 3]>,
+    depth_m: Option<f64>,
+    depth_rank: u32,
+    keypoints: Vec<f64>,
+    num_keypoints: usize,
+    keypoint_source: &'static str,
     source_frame: u32,
     mirrored: bool,
 }
@@ -60,19 +81,13 @@ impl<W: Write> Coco<W> {
         write!(
             out,
             "{{\"info\":{{\"description\":\"a flock made by flockreel\",\"version\":\"{version}\",\
-             \"fps\":{}}},\"licenses\":[],\"categories\":[{{\"id\":1,\"name\":\"animal\",\
-             \"supercategory\":\"animal\"}}],\"images\":[",
-            film.fps
+             \"fps\":{}}},\"licenses\":[],\"categories\":[{}],\"images\":[",
+            film.fps,
+            category()
         )?;
         for frame in 0..film.n_frames {
-            let image = Image {
-                id: frame + 1,
-                file_name: format!("frames/{}", frame_name(frame)),
-                width: film.size_px[0],
-                height: film.size_px[1],
-                frame,
-                time_s: rounded(frame as f64 / film.fps, 6),
-            };
+            let name = format!("frames/{}", frame_name(frame));
+            let image = Image::new(frame as u64 + 1, name, film, frame);
             out.write_all(if frame == 0 { b"\n" } else { b",\n" })?;
             serde_json::to_writer(&mut out, &image)?;
         }
@@ -85,30 +100,10 @@ impl<W: Write> Coco<W> {
 
     /// Adds the annotations of all visible individuals in a frame.
     pub fn add(&mut self, flock: &Flock, frame_idx: usize, truth: &FrameTruth) -> io::Result<()> {
-        for (individual, seen) in with_truth(flock, truth) {
-            let Some(visible_box) = seen.visible_box else {
-                continue;
-            };
+        for mut annotation in annotations(flock, frame_idx, truth, frame_idx as u64 + 1) {
             let first = self.n_annotations == 0;
             self.n_annotations += 1;
-            let annotation = Annotation {
-                id: self.n_annotations,
-                image_id: frame_idx + 1,
-                category_id: 1,
-                track_id: individual.id + 1,
-                iscrowd: 0,
-                area: seen.visible_area,
-                bbox: [visible_box.x, visible_box.y, visible_box.w, visible_box.h],
-                segmentation: visible(truth, visible_box, individual.id),
-                visibility: rounded(seen.visibility, 4),
-                amodal_area: seen.amodal_area,
-                amodal_bbox: seen.amodal_box,
-                amodal_segmentation: amodal(truth.size_px, seen),
-                centroid_px: seen.centroid_px.map(|px| rounded(px, 3)),
-                heading_rad: individual.heading_rad[frame_idx],
-                source_frame: individual.source_frame[frame_idx],
-                mirrored: individual.mirrored[frame_idx],
-            };
+            annotation.id = self.n_annotations;
             self.out.write_all(if first { b"\n" } else { b",\n" })?;
             serde_json::to_writer(&mut self.out, &annotation)?;
         }
@@ -120,6 +115,77 @@ impl<W: Write> Coco<W> {
         self.out.write_all(b"\n]}\n")?;
         self.out.flush()
     }
+}
+
+impl Image {
+    /// Returns the entry of a frame of a film.
+    pub fn new(id: u64, file_name: String, film: &FilmShape, frame: usize) -> Image {
+        Image {
+            id,
+            file_name,
+            width: film.size_px[0],
+            height: film.size_px[1],
+            frame,
+            time_s: rounded(frame as f64 / film.fps, 6),
+        }
+    }
+}
+
+/// Returns the only entry of the list `categories`: the animal, with the names and joints of its keypoints.
+pub fn category() -> String {
+    // The centroid, which is the last keypoint, belongs to no joint.
+    let skeleton: Vec<[usize; 2]> = (1..N_KEYPOINTS - 1).map(|k| [k, k + 1]).collect();
+    json!({
+        "id": 1,
+        "name": "animal",
+        "supercategory": "animal",
+        "keypoints": NAMES,
+        "skeleton": skeleton,
+    })
+    .to_string()
+}
+
+/// Returns the annotations of all visible individuals in a frame. Their `id` is 0.
+pub fn annotations<'a>(
+    flock: &'a Flock,
+    frame_idx: usize,
+    truth: &'a FrameTruth,
+    image_id: u64,
+) -> impl Iterator<Item = Annotation> + 'a {
+    with_truth(flock, truth).filter_map(move |(individual, seen)| {
+        let visible_box = seen.visible_box?;
+        Some(Annotation {
+            id: 0,
+            image_id,
+            category_id: 1,
+            track_id: individual.id + 1,
+            iscrowd: 0,
+            area: seen.visible_area,
+            bbox: [visible_box.x, visible_box.y, visible_box.w, visible_box.h],
+            segmentation: visible(truth, visible_box, individual.id),
+            visibility: rounded(seen.visibility, 4),
+            amodal_area: seen.amodal_area,
+            amodal_bbox: seen.amodal_box,
+            amodal_segmentation: amodal(truth.size_px, seen),
+            centroid_px: seen.centroid_px.map(|px| rounded(px, 3)),
+            heading_rad: individual.heading_rad[frame_idx],
+            forward: individual.forward.as_ref().map(|all| all[frame_idx]),
+            depth_m: individual.depth_m.as_ref().map(|all| all[frame_idx]),
+            depth_rank: seen.depth_rank,
+            keypoints: seen.keypoints.iter().flat_map(keypoint).collect(),
+            num_keypoints: seen.keypoints.iter().flatten().count(),
+            keypoint_source: seen.keypoint_source.name(),
+            source_frame: individual.source_frame[frame_idx],
+            mirrored: individual.mirrored[frame_idx],
+        })
+    })
+}
+
+/// Returns x, y and the flag of COCO: 2 visible, 1 hidden, 0 not measured.
+fn keypoint(point: &Option<Keypoint>) -> [f64; 3] {
+    point.map_or([0.0; 3], |Keypoint { px: [x, y], .. }| {
+        [rounded(x, 3), rounded(y, 3), f64::from(flag(point))]
+    })
 }
 
 fn visible(truth: &FrameTruth, rect: Rect, id: u32) -> RunLengths {

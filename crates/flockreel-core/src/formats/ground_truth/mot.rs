@@ -10,11 +10,12 @@ use crate::geometry::rounded;
 
 /// Writes the lines of one frame, for all individuals at least partly in the picture, hidden or not.
 ///
-/// The columns are frame, identity, left, top, width, height, 1 (counts), 1 (class), visibility.
+/// `number` is the number of the picture, from 0. The columns are frame, identity, left, top, width, height, 1
+/// (counts), 1 (class), visibility.
 pub fn write_frame(
     out: &mut impl Write,
     flock: &Flock,
-    frame_idx: usize,
+    number: usize,
     truth: &FrameTruth,
 ) -> io::Result<()> {
     for (individual, seen) in with_truth(flock, truth) {
@@ -27,7 +28,7 @@ pub fn write_frame(
         writeln!(
             out,
             "{},{},{},{},{w},{h},1,1,{}",
-            frame_idx + 1,
+            number + 1,
             individual.id + 1,
             x + 1,
             y + 1,
@@ -37,12 +38,12 @@ pub fn write_frame(
     Ok(())
 }
 
-/// Returns seqinfo.ini.
-pub fn sequence(film: &FilmShape) -> String {
+/// Returns seqinfo.ini of a sequence whose pictures lie in `folder` and have names with `extension`.
+pub fn sequence(film: &FilmShape, name: &str, folder: &str, extension: &str) -> String {
     let [width, height] = film.size_px;
     format!(
-        "[Sequence]\nname=flock\nimDir=img1\nframeRate={}\nseqLength={}\nimWidth={width}\n\
-         imHeight={height}\nimExt=.png\n",
+        "[Sequence]\nname={name}\nimDir={folder}\nframeRate={}\nseqLength={}\nimWidth={width}\n\
+         imHeight={height}\nimExt=.{extension}\n",
         film.fps, film.n_frames
     )
 }

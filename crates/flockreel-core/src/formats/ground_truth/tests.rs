@@ -88,7 +88,7 @@ fn annotations_match_the_labels() {
 #[test]
 fn tracks_have_a_row_for_each_individual_and_frame() {
     let written = written();
-    let n_cells = tracks::COLUMNS.split(',').count();
+    let n_cells = tracks::header().split(',').count();
     let rows: Vec<Vec<&str>> = written
         .tracks
         .lines()

@@ -72,7 +72,7 @@ impl<'a> Map<'a> {
         let (mut least, mut greatest) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for u in [-reach, width + reach] {
             for v in [-reach, height + reach] {
-                let corner = self.forward(u * unit - middle_x, v * unit - middle_y);
+                let corner = self.place.point([u * unit - middle_x, v * unit - middle_y]);
                 for axis in 0..2 {
                     least[axis] = least[axis].min(corner[axis]);
                     greatest[axis] = greatest[axis].max(corner[axis]);
@@ -82,18 +82,6 @@ impl<'a> Map<'a> {
         let [left, top] = least.map(|edge| edge.floor() as i64);
         let [right, bottom] = greatest.map(|edge| edge.ceil() as i64);
         Rect::clipped(left, top, right, bottom, w, h)
-    }
-
-    /// Returns the picture position of a point given relative to the sprite's middle.
-    fn forward(&self, u: f64, v: f64) -> [f64; 2] {
-        let place = &self.place;
-        let u = if place.mirrored { -u } else { u };
-        let cos = libm::cos(place.rotation_rad) * place.scale;
-        let sin = libm::sin(place.rotation_rad) * place.scale;
-        [
-            place.center_px[0] + cos * u - sin * v,
-            place.center_px[1] + sin * u + cos * v,
-        ]
     }
 
     /// Returns those of `n` columns of a picture row that map into the sprite; empty if none does. `start` is

@@ -47,6 +47,19 @@ pub struct Placement {
     pub mirrored: bool,
 }
 
+impl Placement {
+    /// Returns the position in the picture of a point given from the sprite's middle.
+    pub fn point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let x = if self.mirrored { -x } else { x };
+        let cos = libm::cos(self.rotation_rad) * self.scale;
+        let sin = libm::sin(self.rotation_rad) * self.scale;
+        [
+            self.center_px[0] + cos * x - sin * y,
+            self.center_px[1] + sin * x + cos * y,
+        ]
+    }
+}
+
 /// The picture into which a sprite is drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Viewport<'a> {

@@ -1,0 +1,336 @@
+//! What each flock of a data set shows. Every random number has a key of its own, so a flock does not depend on
+//! the others.
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::{Look, Params};
+use crate::flock;
+use crate::flock::composite::params::Background;
+use crate::formats::params::{self, Error};
+use crate::random;
+
+/// All flocks of a data set.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// The flocks, in order of their numbers.
+    pub sequences: Vec<Sequence>,
+}
+
+/// One flock of a data set.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sequence {
+    /// Number of the flock, from 0.
+    pub number: u32,
+    /// Subset to which its pictures belong.
+    pub split: Split,
+    /// Index of the library.
+    pub library: usize,
+    /// Preset of the flock.
+    pub preset: String,
+    /// Parameters of the flock.
+    pub params: flock::Params,
+    /// Background.
+    pub ground: Ground,
+    /// Camera.
+    pub look: Look,
+}
+
+/// Subset of a data set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Split {
+    /// For training.
+    Train,
+    /// For choosing settings during training.
+    Val,
+    /// For the final test.
+    Test,
+}
+
+impl Split {
+    /// All subsets.
+    pub const ALL: [Split; 3] = [Split::Train, Split::Val, Split::Test];
+
+    /// Returns the name in paths.
+    pub fn name(self) -> &'static str {
+        match self {
+            Split::Train => "train",
+            Split::Val => "val",
+            Split::Test => "test",
+        }
+    }
+}
+
+/// Background of a flock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ground {
+    /// As the flock's parameters say: the footage's background or a color.
+    FromParams,
+    /// The given picture with this index.
+    Picture(usize),
+}
+
+/// What a random number of a flock decides: the second word of its key.
+#[derive(Clone, Copy)]
+enum Choice {
+    Split,
+    Library,
+    Seed,
+    Count,
+    Preset,
+    Scale,
+    Background,
+    Picture,
+    Color,
+    Haze,
+    Shadow,
+    Gain,
+    Blur,
+    Noise,
+    Quality,
+    NoiseSeed,
+}
+
+/// Draws the random numbers of one flock.
+#[derive(Clone, Copy)]
+struct Dice {
+    seed: u64,
+    number: u32,
+}
+
+impl Plan {
+    /// Plans a data set. `sizes_px` are the sizes of the footage of each library, at least one, and `n_pictures` is
+    /// the number of background pictures. Fails if a flock's parameters are invalid.
+    pub fn new(params: &Params, sizes_px: &[[u32; 2]], n_pictures: usize) -> Result<Plan, Error> {
+        let splits = splits(params);
+        let sequence = |(number, split)| sequence(params, number, split, sizes_px, n_pictures);
+        let sequences = (0..params.flocks).zip(splits).map(sequence);
+        Ok(Plan {
+            sequences: sequences.collect::<Result<_, Error>>()?,
+        })
+    }
+
+    /// Returns the names of the subsets that have flocks.
+    pub fn splits(&self) -> Vec<&'static str> {
+        let has = |split: &Split| self.sequences.iter().any(|one| one.split == *split);
+        let splits = Split::ALL.into_iter().filter(has);
+        splits.map(Split::name).collect()
+    }
+}
+
+impl Sequence {
+    /// Returns the name of the flock in paths. It starts with a letter, because readers of tables take a name of
+    /// digits for a number.
+    pub fn name(&self) -> String {
+        format!("flock{:05}", self.number)
+    }
+}
+
+/// Returns the subset of each flock. The flocks are shuffled; the first go to val, the next to test.
+fn splits(params: &Params) -> Vec<Split> {
+    let n = params.flocks;
+    let mut order: Vec<u32> = (0..n).collect();
+    order.sort_by_key(|&number| {
+        let seed = params.seed;
+        (Dice { seed, number }.bits(Choice::Split, 0), number)
+    });
+    // A subset with a share has at least one flock, as long as there are three.
+    let share = |share: f64| match (share * f64::from(n)).round() as u32 {
+        0 if share > 0.0 && n >= 3 => 1,
+        most => most.min(n),
+    };
+    let n_val = share(params.split[1]);
+    let n_test = share(params.split[2]).min(n - n_val);
+    let mut splits = vec![Split::Train; n as usize];
+    for (k, number) in (0u32..).zip(order) {
+        if k < n_val {
+            splits[number as usize] = Split::Val;
+        } else if k < n_val + n_test {
+            splits[number as usize] = Split::Test;
+        }
+    }
+    splits
+}
+
+fn sequence(
+    params: &Params,
+    number: u32,
+    split: Split,
+    sizes_px: &[[u32; 2]],
+    n_pictures: usize,
+) -> Result<Sequence, Error> {
+    let seed = params.seed;
+    let dice = Dice { seed, number };
+    // One library after the other, from a random one on, so that all are used alike.
+    let first = Dice { seed, number: 0 }.bits(Choice::Library, 0) % sizes_px.len() as u64;
+    let library = ((first + u64::from(number)) % sizes_px.len() as u64) as usize;
+    let preset = &params.presets[dice.pick(Choice::Preset, params.presets.len())];
+    let count = params.count.map(f64::from);
+    let mut overrides: Map<String, Value> = params.flock.clone();
+    let drawn = [
+        ("preset", Value::from(preset.as_str())),
+        ("count", Value::from(dice.whole(Choice::Count, count))),
+        (
+            "frames",
+            Value::from((params.pictures - 1) * params.every + 1),
+        ),
+        // Numbers above 2^53 are not exact in JSON files.
+        ("seed", Value::from(dice.bits(Choice::Seed, 0) >> 11)),
+    ];
+    overrides.extend(drawn.map(|(name, value)| (name.to_owned(), value)));
+    let mut flock: flock::Params = params::read(overrides)?;
+    let scale = dice.uniform(Choice::Scale, params.scale);
+    let size_px = sizes_px[library].map(|side| (f64::from(side) * scale).round().max(16.0) as u32);
+    flock.render.size_px = Some(params.size_px.unwrap_or(size_px));
+    flock.render.haze_per_bl = dice.uniform(Choice::Haze, params.haze_per_bl);
+    flock.render.shadow = (params.shadow).map(|range| dice.uniform(Choice::Shadow, range));
+    let (ground, background) = ground(params, &dice, n_pictures);
+    flock.render.background = background;
+    let checked = crate::parameters::Parameters::check(&flock);
+    checked.map_err(Error::Invalid)?;
+    Ok(Sequence {
+        number,
+        split,
+        library,
+        preset: preset.clone(),
+        params: flock,
+        ground,
+        look: look(params, &dice),
+    })
+}
+
+fn ground(params: &Params, dice: &Dice, n_pictures: usize) -> (Ground, Background) {
+    let weights = &params.backgrounds;
+    let picture = if n_pictures > 0 { weights.picture } else { 0.0 };
+    let all = weights.plate + weights.color + picture;
+    let at = dice.uniform(Choice::Background, [0.0, all]);
+    if at < picture {
+        let picture = dice.pick(Choice::Picture, n_pictures);
+        return (Ground::Picture(picture), Background::Plate);
+    }
+    if at < picture + weights.color {
+        let color = [0, 1, 2].map(|k| (dice.bits(Choice::Color, k) >> 56) as u8);
+        return (Ground::FromParams, Background::Color(color));
+    }
+    (Ground::FromParams, Background::Plate)
+}
+
+fn look(params: &Params, dice: &Dice) -> Look {
+    let gain = dice.factor(Choice::Gain, 0, params.gain);
+    let quality = params.jpeg_quality.map(f64::from);
+    Look {
+        gain: [1, 2, 3].map(|k| gain * dice.factor(Choice::Gain, k, params.color_gain)),
+        blur_px: dice.uniform(Choice::Blur, params.blur_px),
+        noise: dice.uniform(Choice::Noise, params.noise),
+        jpeg_quality: dice.whole(Choice::Quality, quality) as u8,
+        seed: dice.bits(Choice::NoiseSeed, 0),
+    }
+}
+
+impl Dice {
+    fn bits(self, choice: Choice, k: u64) -> u64 {
+        random::bits(self.seed, &[u64::from(self.number), choice as u64, k])
+    }
+
+    /// Returns a number in [0, 1).
+    fn share(self, choice: Choice, k: u64) -> f64 {
+        random::uniform(self.seed, &[u64::from(self.number), choice as u64, k])
+    }
+
+    fn uniform(self, choice: Choice, [low, high]: [f64; 2]) -> f64 {
+        low + (high - low) * self.share(choice, 0)
+    }
+
+    /// Returns a whole number of a range, its ends included.
+    fn whole(self, choice: Choice, [low, high]: [f64; 2]) -> u32 {
+        (low + (high - low + 1.0) * self.share(choice, 0))
+            .floor()
+            .min(high) as u32
+    }
+
+    /// Returns a factor of a range, uniform in its logarithm.
+    fn factor(self, choice: Choice, k: u64, [low, high]: [f64; 2]) -> f64 {
+        low * libm::pow(high / low, self.share(choice, k))
+    }
+
+    fn pick(self, choice: Choice, n: usize) -> usize {
+        (self.bits(choice, 0) % n as u64) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(params: &Params) -> Plan {
+        Plan::new(params, &[[640, 480], [320, 240]], 3).expect("good parameters")
+    }
+
+    fn params(flocks: u32) -> Params {
+        Params {
+            flocks,
+            shadow: Some([0.1, 0.3]),
+            ..Params::default()
+        }
+    }
+
+    #[test]
+    fn values_lie_in_their_ranges_and_reach_both_ends() {
+        let params = params(400);
+        let plan = plan(&params);
+        let all = |of: &dyn Fn(&Sequence) -> f64, [low, high]: [f64; 2]| {
+            let values: Vec<f64> = plan.sequences.iter().map(of).collect();
+            let (min, max) = values
+                .iter()
+                .fold((f64::MAX, f64::MIN), |(min, max), &value| {
+                    (min.min(value), max.max(value))
+                });
+            let reach = 0.06 * (high - low);
+            assert!(low <= min && min < low + reach, "{min} {low}");
+            assert!(high - reach < max && max <= high, "{max} {high}");
+        };
+        all(&|one| f64::from(one.params.count.unwrap_or(0)), [2.0, 20.0]);
+        all(&|one| one.look.noise, params.noise);
+        all(&|one| one.look.blur_px, params.blur_px);
+        all(&|one| f64::from(one.look.jpeg_quality), [70.0, 95.0]);
+        all(&|one| one.params.render.haze_per_bl, params.haze_per_bl);
+        all(&|one| one.params.render.shadow.unwrap_or(9.0), [0.1, 0.3]);
+        let of =
+            |is: &dyn Fn(&Sequence) -> bool| plan.sequences.iter().filter(|one| is(one)).count();
+        assert_eq!(of(&|one| one.library == 0), 200);
+        let n_pictures = of(&|one| one.ground != Ground::FromParams);
+        assert!((150..220).contains(&n_pictures), "{n_pictures}");
+        let is_color =
+            |one: &Sequence| matches!(one.params.render.background, Background::Color(_));
+        let n_colors = of(&is_color);
+        assert!((20..60).contains(&n_colors), "{n_colors}");
+    }
+
+    #[test]
+    fn each_flock_has_one_split_and_the_shares_hold() {
+        let count = |flocks, split| {
+            let plan = plan(&params(flocks));
+            plan.sequences
+                .iter()
+                .filter(|one| one.split == split)
+                .count()
+        };
+        assert_eq!(Split::ALL.map(|split| count(40, split)), [32, 4, 4]);
+        assert_eq!(Split::ALL.map(|split| count(4, split)), [2, 1, 1]);
+        assert_eq!(Split::ALL.map(|split| count(1, split)), [1, 0, 0]);
+    }
+
+    #[test]
+    fn a_flock_depends_on_the_seed_and_on_its_number_only() {
+        let (few, many) = (plan(&params(10)), plan(&params(40)));
+        for (a, b) in few.sequences.iter().zip(&many.sequences) {
+            assert_eq!((&a.params, a.look, a.ground), (&b.params, b.look, b.ground));
+        }
+        let other = Params {
+            seed: 2,
+            ..params(10)
+        };
+        assert!(plan(&other).sequences[0].params.seed != few.sequences[0].params.seed);
+    }
+}
