@@ -117,6 +117,14 @@ pub fn joint_frames(length_m: f64, angles_rad: &[f64; N_JOINTS]) -> [(DVec3, DQu
     })
 }
 
+/// Returns the point of the spine at `s` in the fish's own frame, in metres. `joints` are the joint frames of
+/// a fish of `length_m`.
+pub fn spine_at_m(length_m: f64, joints: &[(DVec3, DQuat); N_JOINTS], s: f64) -> DVec3 {
+    let j = JOINT_S.partition_point(|&at| at <= s).max(1) - 1;
+    let (pivot, rotation) = joints[j];
+    pivot + rotation * DVec3::new((JOINT_S[j] - s) * length_m, 0.0, 0.0)
+}
+
 /// Returns the position of joint `j` in the fish's own frame when the body is straight, in metres.
 pub fn joint_at_rest_m(length_m: f64, j: usize) -> DVec3 {
     DVec3::new((ORIGIN_S - JOINT_S[j]) * length_m, 0.0, 0.0)
