@@ -13,11 +13,12 @@ use rayon::prelude::*;
 
 use super::error::Error;
 use super::film::Film;
+use super::mesh::Mesh;
 use super::motion::{Motion, Posture, bank_rad, rotation_of};
 use super::params::{Palette, Params};
 use super::render::Drawing;
 use super::scenery::{gravel_scene, tank_scene};
-use super::spine::{Swimming, effort_at, joint_frames, spine_at_m};
+use super::spine::{Swimming, bend_of_turn_bl, effort_at, joint_frames, spine_at_m};
 use super::swimmer::{self, PANE_Z_M, SwimmerState, TANK_M};
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
 use crate::geometry::{Camera, Rect};
@@ -88,7 +89,6 @@ impl SampleFilm {
                 medium_index: 1.0,
             },
             size,
-            palette: params.palette,
             frames: states
                 .iter()
                 .map(|s| seen_from(params.view, posture(s, size)))
@@ -99,7 +99,7 @@ impl SampleFilm {
             View::Top => gravel_scene(width, height, params.seed),
         };
         Ok(SampleFilm {
-            film: Film::new(motion, scene),
+            film: Film::new(motion, Mesh::goldfish(size, params.palette), scene),
             noise: noise_table(params.seed, params.noise, width),
             params,
         })
@@ -282,7 +282,7 @@ fn posture(state: &SwimmerState, size: Animal) -> Posture {
     let swimming = Swimming {
         phase_turns: state.phase_turns,
         effort: effort_at(speed_bl_per_s),
-        turn_rad_per_s: state.turn_rad_per_s,
+        bend_bl: bend_of_turn_bl(state.turn_rad_per_s),
     };
     let limit_rad = Params::default().bank_rad;
     let roll = bank_rad(state.turn_rad_per_s, state.speed_m_per_s, limit_rad);
