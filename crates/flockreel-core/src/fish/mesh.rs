@@ -19,8 +19,8 @@ pub struct Material {
     pub color: [f32; 4],
     /// Shininess, 0..=1.
     pub shine: f32,
-    /// Texture coordinates. With a picture: position in it, 0..=1 across and down. Without, on the body: row and column of scales. On a fin: ray, and position from base to
-    /// edge.
+    /// Texture coordinates. With a picture: position in it, 0..=1 across and down. Without one, on the body: row
+    /// and column of scales; on a fin: ray, and position from base to edge.
     pub grain: [f32; 2],
     /// Strength of the texture: > 0 scales, < 0 fin rays, 0 none.
     pub grain_depth: f32,

@@ -83,11 +83,11 @@ fn figure_is_found_where_it_was_drawn() {
         let off = (got.center_px[0] - 80.0).hypot(got.center_px[1] - 60.0);
         assert!(off < 3.0, "{got:?}");
         assert!(
-            (libm::cos(got.yaw_rad) - libm::cos(yaw_rad)).abs() < 0.12,
+            (libm::cos(got.yaw_rad) - libm::cos(yaw_rad)).abs() < 0.2,
             "{got:?}"
         );
         assert!((got.pitch_rad - pitch_rad).abs() < 0.1, "{got:?}");
-        assert!((got.length_px / length_px - 1.0).abs() < 0.12, "{got:?}");
+        assert!((got.length_px / length_px - 1.0).abs() < 0.15, "{got:?}");
     }
 }
 

@@ -71,13 +71,16 @@ fn add_mesh(packer: &mut Packer, fish: &FishMesh) -> Index<Mesh> {
         (Semantic::Joints(0), packer.joints(&joints)),
         (Semantic::Weights(0), packer.weights(&weights)),
     ];
-    let body = add_material(packer, "body", AlphaMode::Opaque, 0.42, picture);
-    let fins = add_material(packer, "fins", AlphaMode::Blend, 0.6, picture);
     let mut primitives = Vec::new();
-    for (triangles, material) in [(&fish.body, body), (&fish.fins, fins)] {
+    let surfaces = [
+        (&fish.body, "body", AlphaMode::Opaque, 0.42),
+        (&fish.fins, "fins", AlphaMode::Blend, 0.6),
+    ];
+    for (triangles, name, alpha, rough) in surfaces {
         if triangles.is_empty() {
             continue;
         }
+        let material = add_material(packer, name, alpha, rough, picture);
         primitives.push(Primitive {
             attributes: attributes
                 .iter()
