@@ -8,12 +8,7 @@ use crate::library::Pose;
 #[derive(Clone)]
 pub(super) enum Chart {
     /// Flat body seen from the side.
-    Flat {
-        /// Place of the body.
-        fit: Fit,
-        /// Position of the centroid along the body.
-        center_s: f64,
-    },
+    Flat(Flat),
     /// Body bent along a midline seen from above.
     Curved {
         /// Midline of the frame.
@@ -27,13 +22,7 @@ impl Chart {
     /// Returns the image point of a point of the body.
     pub(super) fn image(&self, s: f64, t: f64) -> [f64; 2] {
         match self {
-            Chart::Flat { fit, center_s } => {
-                let [along, across] = fit.axes();
-                let ds = s - center_s;
-                let bent_px = fit.bent_px() * stiff(s) * stiff(s);
-                let x = fit.center_px[0] + ds * along[0] + t * across[0] + bent_px;
-                [x, fit.center_px[1] + ds * along[1] + t * across[1]]
-            }
+            Chart::Flat(flat) => flat.image(s, t),
             Chart::Curved { midline, length_px } => {
                 let ([x, y], [ux, uy]) = midline.at(s * length_px);
                 [x - t * length_px * uy, y + t * length_px * ux]
@@ -79,32 +68,60 @@ impl Fit {
         self.yaw_rad > -FRAC_PI_2
     }
 
-    /// Returns the image of one body length along the body (to the tail) and across it (to the belly), pixels.
-    pub(super) fn axes(&self) -> [[f64; 2]; 2] {
-        let cos_yaw = libm::cos(self.yaw_rad);
+    /// Returns the map between body and picture for a figure with its centroid at `center_s`.
+    pub(super) fn flat(&self, center_s: f64) -> Flat {
+        let (sin_yaw, cos_yaw) = (libm::sin(self.yaw_rad), libm::cos(self.yaw_rad));
         let (sin, cos) = (libm::sin(self.pitch_rad), libm::cos(self.pitch_rad));
-        let along = [-cos_yaw * cos, -sin];
-        let across = [-cos_yaw * sin, cos];
-        [along, across].map(|axis| axis.map(|v| v * self.length_px))
+        Flat {
+            center_px: self.center_px,
+            center_s,
+            along_px: [-cos_yaw * cos, -sin].map(|v| v * self.length_px),
+            across_px: [-cos_yaw * sin, cos].map(|v| v * self.length_px),
+            bent_px: -sin_yaw * self.length_px * self.bend_bl,
+        }
     }
 
-    /// Returns how far the bend moves a point one body length behind the stiff head, in pixels to the right.
-    fn bent_px(&self) -> f64 {
-        -libm::sin(self.yaw_rad) * self.length_px * self.bend_bl
+    /// Moves the center by body coordinates, and makes the unit of length `scale` times as long.
+    pub(super) fn rebase(&mut self, [ds, dt]: [f64; 2], scale: f64) {
+        self.bend_bl = 0.0;
+        self.center_px = self.flat(0.0).image(ds, dt);
+        self.length_px *= scale;
+    }
+}
+
+/// Map between a flat, bent body and the picture.
+#[derive(Clone)]
+pub(super) struct Flat {
+    center_px: [f64; 2],
+    center_s: f64,
+    /// Image of one body length along the body (to the tail).
+    along_px: [f64; 2],
+    /// Image of one body length across the body (to the belly).
+    across_px: [f64; 2],
+    /// How far the bend moves a point one body length behind the stiff head, to the right.
+    bent_px: f64,
+}
+
+impl Flat {
+    /// Returns the image point of a point of the body.
+    pub(super) fn image(&self, s: f64, t: f64) -> [f64; 2] {
+        let ds = s - self.center_s;
+        let at = |c: usize| self.center_px[c] + ds * self.along_px[c] + t * self.across_px[c];
+        [at(0) + self.bent_px * stiff(s) * stiff(s), at(1)]
     }
 
-    /// Returns the body coordinates at an image point; `None` where the bent body folds, and for a
-    /// body without area.
-    pub(super) fn body_at(&self, [x, y]: [f64; 2], center_s: f64) -> Option<[f64; 2]> {
-        let [[ax, ay], [bx, by]] = self.axes();
+    /// Returns the body coordinates at an image point; `None` where the bent body folds, and for a body without
+    /// area.
+    pub(super) fn body_at(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        let ([ax, ay], [bx, by]) = (self.along_px, self.across_px);
         let det = ax * by - ay * bx;
         if det.abs() < 1e-6 {
             return None;
         }
         let (dx, dy) = (x - self.center_px[0], y - self.center_px[1]);
         // Straight, the point would lie at `from`; the bend solves u + pull u^2 = from.
-        let from = stiff(center_s + (dx * by - dy * bx) / det);
-        let pull = self.bent_px() * by / det;
+        let from = stiff(self.center_s + (dx * by - dy * bx) / det);
+        let pull = self.bent_px * by / det;
         let root = 1.0 + 4.0 * pull * from;
         let behind = if pull.abs() < 1e-9 || from == 0.0 {
             from
@@ -113,19 +130,9 @@ impl Fit {
         } else {
             return None;
         };
-        let bent_px = self.bent_px() * behind * behind;
-        let s = center_s + ((dx - bent_px) * by - dy * bx) / det;
-        Some([s, (ax * dy - ay * (dx - bent_px)) / det])
-    }
-
-    /// Moves the center by body coordinates, and makes the unit of length `scale` times as long.
-    pub(super) fn rebase(&mut self, [ds, dt]: [f64; 2], scale: f64) {
-        let [along, across] = self.axes();
-        for c in 0..2 {
-            self.center_px[c] += ds * along[c] + dt * across[c];
-        }
-        self.length_px *= scale;
-        self.bend_bl = 0.0;
+        let dx = dx - self.bent_px * behind * behind;
+        let s = self.center_s + (dx * by - dy * bx) / det;
+        Some([s, (ax * dy - ay * dx) / det])
     }
 }
 

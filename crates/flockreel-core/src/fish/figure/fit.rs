@@ -102,10 +102,10 @@ impl Outline {
     }
 
     fn overlap(&self, sheet: &Sheet, center_s: f64, fit: &Fit) -> f64 {
+        let flat = fit.flat(center_s);
         let (mut both, mut either) = (0.0, 1e-9);
         for &(point, alpha) in &self.points {
-            let body = fit.body_at(point, center_s);
-            let other = body.map_or(0.0, |at| sheet.alpha_at(at));
+            let other = flat.body_at(point).map_or(0.0, |at| sheet.alpha_at(at));
             both += f64::from(alpha.min(other));
             either += f64::from(alpha.max(other));
         }

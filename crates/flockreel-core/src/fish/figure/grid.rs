@@ -21,13 +21,13 @@ pub(super) struct Grid {
 /// Seed of the texture that continues the animal's. Free choice.
 const SEED: u64 = 62;
 /// Number of frames whose pixels make the picture. Free choice; more blur it.
-const N_SHOWN: usize = 5;
+const N_SHOWN: usize = 7;
 /// Largest number of texels. Free choice; a goldfish with long fins has 120,000 at 320 a length.
 const MOST_TEXELS: f64 = 200_000.0;
 /// Alpha of a frame's texel from which its color counts, 0..=255: the animal covers most of it.
 const COVERED: f32 = 192.0;
-/// Alpha from which a texel without a color gets texture, 0..=255. Free choice: half of the frames cover it.
-const SEEN: f32 = 128.0;
+/// Alpha from which a texel without a color gets texture. Free choice: half of the frames cover it.
+const SEEN: f32 = 0.5;
 
 impl Grid {
     /// Returns the grid of a range along and a range across the body.
@@ -70,8 +70,8 @@ impl Grid {
         (0..w * h).map(texel).collect()
     }
 
-    /// Returns the picture: the median color and the mean alpha of the frames whose outline is the most usual,
-    /// each made equally bright. Texture fills what none of them shows.
+    /// Returns the picture: the median color of the frames whose outline is the most usual, each made equally
+    /// bright, and the alpha of the sheet. Texture fills what none of them shows.
     pub(super) fn picture(&self, sheet: &Sheet, charts: &[Chart], pixels: &[Pixels]) -> RgbaImage {
         let mut brightness: Vec<f32> = pixels.iter().map(Pixels::brightness).collect();
         let each = brightness.clone();
@@ -93,14 +93,6 @@ impl Grid {
             .into_par_iter()
             .map(|k| median_color(layers.iter().map(|layer| layer[k])))
             .collect();
-        let sum = |k: usize| {
-            layers
-                .iter()
-                .map(|layer| f32::from(layer[k][3]))
-                .sum::<f32>()
-        };
-        let n = layers.len().max(1) as f32;
-        let alphas: Vec<f32> = (0..w * h).map(|k| sum(k) / n).collect();
         let mut image = RgbImage::new(w as u32, h as u32);
         for (pixel, color) in image.pixels.chunks_exact_mut(3).zip(&colors) {
             pixel.copy_from_slice(&color.unwrap_or_default());
@@ -109,14 +101,14 @@ impl Grid {
         let unknown: Vec<bool> = colors.iter().map(Option::is_none).collect();
         smooth(&mut image, &unknown);
         let is_seen = |(unknown, alpha): (&bool, &f32)| *unknown && *alpha >= SEEN;
-        let unseen: Vec<bool> = unknown.iter().zip(&alphas).map(is_seen).collect();
+        let unseen: Vec<bool> = unknown.iter().zip(&sheet.alpha).map(is_seen).collect();
         sample_texture(&mut image, &unseen, SEED);
-        let texels = image.pixels.chunks_exact(3).zip(&alphas);
+        let texels = image.pixels.chunks_exact(3).zip(&sheet.alpha);
         RgbaImage {
             width: w as u32,
             height: h as u32,
             pixels: texels
-                .flat_map(|(rgb, alpha)| [rgb[0], rgb[1], rgb[2], alpha.round() as u8])
+                .flat_map(|(rgb, alpha)| [rgb[0], rgb[1], rgb[2], (alpha * 255.0).round() as u8])
                 .collect(),
         }
     }

@@ -190,10 +190,7 @@ fn usual_length_px(fits: &[Fit]) -> Result<f64, Error> {
 
 fn charts(fits: &[Fit], center_s: f64) -> Vec<Chart> {
     fits.iter()
-        .map(|fit| Chart::Flat {
-            fit: *fit,
-            center_s,
-        })
+        .map(|fit| Chart::Flat(fit.flat(center_s)))
         .collect()
 }
 

@@ -15,16 +15,12 @@ fn drawn(fit: &Fit) -> Pixels {
         let in_tail = (0.65..1.0).contains(&s) && t.abs() < 0.25 * (s - 0.6);
         body.0 * body.0 + body.1 * body.1 < 1.0 || in_tail
     };
-    let [[ax, ay], [bx, by]] = fit.axes();
-    let det = ax * by - ay * bx;
+    let flat = fit.flat(0.5);
     let pixel = |k: usize| {
-        let (dx, dy) = (
-            (30 + k % 100) as f64 + 0.5 - fit.center_px[0],
-            (30 + k / 100) as f64 + 0.5 - fit.center_px[1],
-        );
-        let (s, t) = (0.5 + (dx * by - dy * bx) / det, (ax * dy - ay * dx) / det);
+        let at = [(30 + k % 100) as f64 + 0.5, (30 + k / 100) as f64 + 0.5];
+        let is_covered = flat.body_at(at).is_some_and(|[s, t]| covers(s, t));
         let [r, g, b] = ORANGE;
-        [r, g, b, if covers(s, t) { 255 } else { 0 }]
+        [r, g, b, if is_covered { 255 } else { 0 }]
     };
     let rgba = (0..100 * 60).flat_map(pixel).collect();
     Pixels::of([30, 30], [100, 60], [160, 120], rgba)
@@ -54,11 +50,9 @@ fn bent_body_is_mapped_there_and_back() {
         bend_bl: 0.3,
         ..fit(-1.0, 0.2, 100.0)
     };
-    let chart = &charts(&[bent], 0.5)[0];
+    let flat = bent.flat(0.5);
     for at in [[0.05, 0.1], [0.4, -0.1], [0.9, 0.05]] {
-        let [s, t] = bent
-            .body_at(chart.image(at[0], at[1]), 0.5)
-            .expect("no fold");
+        let [s, t] = flat.body_at(flat.image(at[0], at[1])).expect("no fold");
         assert!(
             (s - at[0]).abs() < 1e-9 && (t - at[1]).abs() < 1e-9,
             "{at:?} {s} {t}"
