@@ -8,7 +8,7 @@ RELEASE = target/release/flockreel
 DEBUG = target/debug/flockreel
 
 .DEFAULT_GOAL := help
-.PHONY: help run test demo check fmt clippy programs unit scale-test race guards truth-test readers page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers service hostile transitions swift page-bench screenshots count ablation vendor clean-data build
+.PHONY: help run test demo check fmt clippy programs unit scale-test race guards truth-test readers page-types page-test contract-test stress-test fuzz soak kills arm-test docs deny supply bench measure accuracy flocks papers fish service hostile transitions swift page-bench screenshots count ablation vendor clean-data build
 
 help: ## list the commands
 	@awk -F':.*## ' '/^[a-z-]+:.*## /{printf "  make %-14s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -145,7 +145,7 @@ bench: build target/bench-venv/ready ## measure the speed against ffmpeg, OpenCV
 	$(BENCH) bench/reproduce.py $(RELEASE) target/demo/library target/demo/footage.mp4
 
 # The figures of bench/results. Each of these targets also writes docs/measurements.md.
-measure: accuracy flocks papers service hostile transitions page-bench ## write docs/measurements.md: make measure GENERATOR=goldfish.py FOOTAGE=folder
+measure: accuracy flocks papers fish service hostile transitions page-bench ## write docs/measurements.md: make measure GENERATOR=goldfish.py FOOTAGE=folder
 	$(BENCH) bench/measurements.py
 
 accuracy: build target/bench-venv/ready ## compare poses with the truth: make accuracy GENERATOR=goldfish.py [FOOTAGE=folder] [AGAINST=program] [ONLY=shoal,plants-2]
@@ -156,6 +156,9 @@ flocks: build target/bench-venv/ready ## compare flocks with the films of their 
 
 papers: build target/bench-venv/ready ## compare the papers' methods as printed with flockreel, on films with known truth
 	$(BENCH) bench/papers.py $(RELEASE)
+
+fish: build target/bench-venv/ready ## compare the virtual animal with the filmed one: make fish [FOOTAGE=folder]
+	$(BENCH) bench/fish.py $(RELEASE) $(if $(FOOTAGE),--footage $(FOOTAGE))
 
 service: build target/bench-venv/ready ## compare the speed of the service with cp and nginx
 	@scripts/system-packages.sh bench

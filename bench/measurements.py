@@ -35,7 +35,7 @@ def section(result):
 
 
 # Sections in the order of the page.
-SECTIONS = {"accuracy": accuracy.page, "flocks": flocks.page, "papers": section, "ablation": ablation.page, "speed": section,
+SECTIONS = {"accuracy": accuracy.page, "flocks": flocks.page, "papers": section, "fish": section, "ablation": ablation.page, "speed": section,
             "transitions": section, "swift": section, "service": section, "hostile": section, "page": section, "soak": section, "rebuild": section, "count": section}
 
 

@@ -87,7 +87,8 @@ pub(super) struct FishView {
 
 /// Start making a virtual fish.
 ///
-/// Queues a job that renders a fish moved by the poses of a library. If the analysis of the library is still
+/// Queues a job that renders a virtual animal moved by the poses of a library. It looks like the filmed animal, or
+/// like a goldfish (`body`). If the analysis of the library is still
 /// queued or running, the job waits for it.
 ///
 /// The response is 202. `Location` is the address of the job, and `Link` that of the future virtual fish.

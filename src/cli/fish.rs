@@ -7,8 +7,9 @@ use serde_json::{Map, Value, json};
 
 use super::{Error, Listener, Summary, set};
 use crate::media::{self, Tool, VideoFormat, VideoWriter};
-use flockreel_core::fish::{self, Film, Motion, Params, side_by_side};
+use flockreel_core::fish::{self, Film, Params, side_by_side};
 use flockreel_core::formats::{glb, params};
+use flockreel_core::geometry::rounded;
 use flockreel_core::library::Library;
 use flockreel_core::progress::Progress;
 use flockreel_core::raster::{ColorSpec, Frame};
@@ -27,6 +28,8 @@ pub struct Args {
     side_by_side: bool,
     #[arg(long, value_name = "NAME", help = set::presets_help::<Params>())]
     preset: Option<String>,
+    #[arg(long, help = set::parameter_help::<Params>("body"))]
+    body: Option<String>,
     #[arg(long, help = set::parameter_help::<Params>("palette"))]
     palette: Option<String>,
     #[arg(long, value_name = "NAME=JSON", help = set::help("bank_rad=0.4"))]
@@ -38,7 +41,9 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let params = params_of(&args)?;
     media::search_in_background(&[Tool::Ffmpeg]);
     let stored = super::read_library(&args.library, &args.output)?;
-    let motion = fish::drive(&stored.library.poses, &params)?;
+    let film = Film::of(&stored.library, &params)?;
+    let motion = film.motion();
+    let alike = fish::likeness(&stored.library, &film);
     let n_visible = motion.frames.iter().filter(|p| p.visible).count();
     let n_frames = motion.frames.len();
     match super::extension(&args.output).as_str() {
@@ -47,8 +52,8 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
                 "--side-by-side needs an output that ends in .mp4".into(),
             ));
         }
-        "glb" => super::write_file(&args.output, glb::write(&motion))?,
-        "mp4" => write_video(&stored.library, motion, &args)?,
+        "glb" => super::write_file(&args.output, glb::write(motion, film.renderer().mesh()))?,
+        "mp4" => write_video(&stored.library, &film, &args)?,
         other => {
             return Err(Error::Usage(format!(
                 "the output must end in .mp4 or .glb: .{other}"
@@ -59,11 +64,18 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         "output": args.output.display().to_string(),
         "frames": n_frames,
         "visible_frames": n_visible,
+        "compared_frames": alike.map_or(0, |alike| alike.n_frames),
+        "silhouette_overlap": alike.map(|alike| rounded(alike.overlap, 3)),
+        "color_difference_levels": alike.map(|alike| rounded(alike.color_levels, 1)),
     }))))
 }
 
 fn params_of(args: &Args) -> Result<Params, Error> {
-    let given = [("palette", &args.palette), ("preset", &args.preset)];
+    let given = [
+        ("body", &args.body),
+        ("palette", &args.palette),
+        ("preset", &args.preset),
+    ];
     let mut overrides: Map<String, Value> = given
         .into_iter()
         .filter_map(|(name, value)| Some((name.to_owned(), json!(value.as_ref()?))))
@@ -72,7 +84,8 @@ fn params_of(args: &Args) -> Result<Params, Error> {
     params::read(overrides).map_err(|error| Error::Usage(error.to_string()))
 }
 
-fn write_video(library: &Library, motion: Motion, args: &Args) -> Result<(), Error> {
+fn write_video(library: &Library, film: &Film, args: &Args) -> Result<(), Error> {
+    let motion = film.motion();
     let [width, height] = motion.image_size_px;
     let n_frames = motion.frames.len();
     let video = VideoFormat {
@@ -81,13 +94,12 @@ fn write_video(library: &Library, motion: Motion, args: &Args) -> Result<(), Err
         fps: motion.fps,
         color: ColorSpec::default(),
     };
-    let film = Film::new(motion, library.background.clone());
     let mut writer = VideoWriter::create(&args.output, &video)?;
     let listener = Listener::new();
     let mut frame = Frame::new(video.width, video.height, video.color);
     for frame_idx in 0..n_frames {
         if args.side_by_side {
-            side_by_side::render(library, &film, frame_idx, &mut frame)
+            side_by_side::render(library, film, frame_idx, &mut frame)
         } else {
             film.render(frame_idx, &mut frame)
         }

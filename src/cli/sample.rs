@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde_json::json;
 
 use super::{Error, Listener, Summary};
@@ -10,6 +11,7 @@ use crate::media::VideoWriter;
 use flockreel_core::fish::sample::{SampleFilm, SampleParams};
 use flockreel_core::footage::{FrameSource, SourceError};
 use flockreel_core::formats::poses_json;
+use flockreel_core::library::View;
 use flockreel_core::progress::Progress;
 use flockreel_core::raster::Frame;
 
@@ -34,6 +36,9 @@ pub struct Args {
     /// Width and height of the picture, pixels, 64x64 to 7680x4320.
     #[arg(long, default_value = "640x480", value_name = "WxH", value_parser = parse_size)]
     size: [u32; 2],
+    /// Side from which the tank is filmed.
+    #[arg(long, default_value = "side", value_name = "VIEW", value_parser = view_parser())]
+    view: View,
 }
 
 /// Writes the video and, if requested, the true poses.
@@ -44,6 +49,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         fps: args.fps,
         width: args.size[0],
         height: args.size[1],
+        view: args.view,
         ..SampleParams::default()
     };
     let film = SampleFilm::new(params)?;
@@ -81,6 +87,11 @@ pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
         Some((Ok(width), Ok(height))) => Ok([width, height]),
         _ => Err("the size must have the form 640x480".into()),
     }
+}
+
+fn view_parser() -> impl TypedValueParser<Value = View> {
+    let views = PossibleValuesParser::new(["side", "top"]);
+    views.map(|name| if name == "top" { View::Top } else { View::Side })
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 use super::{Attempt, Error, Extent, JobInput, Product, Stages, Subject};
 use crate::media::{VideoFormat, VideoWriter};
 use crate::store::jobs::Kind;
-use flockreel_core::fish::{Film, Params, drive};
+use flockreel_core::fish::{Film, Params};
 use flockreel_core::formats::glb;
 use flockreel_core::ids::{FishId, LibraryId};
 use flockreel_core::progress::Progress;
@@ -54,8 +54,10 @@ impl JobInput for Input {
 
     fn run(&self, attempt: &Attempt) -> Result<Product, Error> {
         let library = attempt.library()?;
-        let motion = drive(&library.poses, &self.params)?;
-        std::fs::write(attempt.folder().join("model.glb"), glb::write(&motion))?;
+        let film = Film::of(&library, &self.params)?;
+        let motion = film.motion();
+        let model = glb::write(motion, film.renderer().mesh());
+        std::fs::write(attempt.folder().join("model.glb"), model)?;
         let summary = Summary {
             fps: motion.fps,
             image_size_px: motion.image_size_px,
@@ -66,7 +68,7 @@ impl JobInput for Input {
                 .filter(|posture| posture.visible)
                 .count(),
         };
-        render(attempt, &Film::new(motion, library.background))?;
+        render(attempt, &film)?;
         Ok(Product {
             film: None,
             params: serde_json::to_string(&self.params)?,

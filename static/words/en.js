@@ -254,8 +254,8 @@ export default {
 
   // Virtual fish.
   "fish.title": "Virtual fish: {film}",
-  "fish.what": "A 3-D model of a goldfish swims as the filmed animal does. Without a calibrated camera the depth is unknown, and the fish always turns around facing the camera.",
-  "fish.what.top": "The film was taken from above, so the virtual fish shows its back and swims at one depth. It is a goldfish, whatever the animal is.",
+  "fish.what": "A 3-D model with the outline and the colors of the filmed animal swims as it does. Without a calibrated camera the depth is unknown, and the fish always turns around facing the camera.",
+  "fish.what.top": "The film was taken from above, so the virtual animal shows its back and moves at one depth. It is a flat picture of the animal that bends along its midline; legs are part of the picture.",
   "fish.none": "This film has no virtual fish yet. Making one draws every frame of the film, which takes a few minutes.", "fish.make": "Make the virtual fish", "fish.make.other": "Make this fish too",
   "fish.left": "The film", "fish.right": "The virtual fish", "fish.wireframe": "Wireframe over the film", "fish.wireframe.label": "Wireframe of the virtual fish over the film",
   "fish.no_film": "This browser cannot play the film. Its background is shown.", "fish.no_webgl": "This browser has no WebGL 2, so the fish is shown as a film and cannot be turned.", "fish.film.label": "Film of the virtual fish",
@@ -266,7 +266,7 @@ export default {
   "fish.turn": "Turn and zoom", "fish.turn.left": "Turn left", "fish.turn.right": "Turn right", "fish.turn.up": "Turn up", "fish.turn.down": "Turn down", "fish.turn.nearer": "Nearer", "fish.turn.farther": "Farther", "fish.turn.reset": "Reset the view",
   "fish.keys": "Drag to turn, wheel or two fingers to zoom. Keys: Space plays, ← → one frame (with Shift ten), Home and End, + and − zoom, 0 resets the view.", "fish.keys.flat": "Keys: Space plays, ← → one frame (with Shift ten), Home and End.",
   "fish.options": "Another fish", "fish.papers": "As in the paper", "fish.papers.help": "The fish of Nakajima et al. is stiff and upright, and follows values that are not smoothed.",
-  "set.palette": "Colors", "set.palette.goldfish": "Goldfish", "set.palette.silver": "Silver", "set.palette.bronze": "Bronze", "set.swim": "The body bends", "set.bank_rad": "Largest roll in a turn (degrees)",
+  "set.body": "Body", "set.body.own": "The filmed animal", "set.body.goldfish": "Goldfish", "set.palette": "Colors of the goldfish", "set.palette.goldfish": "Goldfish", "set.palette.silver": "Silver", "set.palette.bronze": "Bronze", "set.swim": "The body bends", "set.bank_rad": "Largest roll in a turn (degrees)",
   "set.smooth_s": "Smoothing (seconds)", "set.bridge_s": "Longest gap to fill (seconds)", "set.length_m": "Length (cm)", "set.height_m": "Height with fins (cm)",
   "fish.rigid": "stiff", "fish.upright": "upright", "fish.shown": "shown here",
   "fish.files": "Downloads", "fish.files.help": "The model opens in Blender, Unity and other 3-D programs. The film shows the fish in front of the empty background.",

@@ -253,8 +253,8 @@ export default {
 
   // Virtual fish.
   "fish.title": "バーチャルフィッシュ：{film}",
-  "fish.what": "撮影した動物と同じ動きをする、3Dモデルの金魚です。カメラまでの距離が分からない動画では奥行きも分からないため、手前側で向きを変えるものとして動かします。",
-  "fish.what.top": "上から撮影した動画なので、バーチャルフィッシュは背を見せ、一定の深さで泳ぎます。どの動物を撮影しても、金魚の形になります。",
+  "fish.what": "撮影した動物の輪郭と色をもつ3Dモデルが、その動物と同じように動きます。カメラまでの距離が分からない動画では奥行きも分からないため、手前側で向きを変えるものとして動かします。",
+  "fish.what.top": "上から撮影した動画なので、背を見せ、一定の深さで動きます。体は平らな絵で、動物の正中線に沿って曲がります。脚は絵の一部です。",
   "fish.none": "この動画のバーチャルフィッシュはまだありません。全フレームを描くため、作成には数分かかります。", "fish.make": "バーチャルフィッシュを作成", "fish.make.other": "この設定で作成",
   "fish.left": "動画", "fish.right": "バーチャルフィッシュ", "fish.wireframe": "ワイヤーフレームを重ねる", "fish.wireframe.label": "動画に重ねたバーチャルフィッシュのワイヤーフレーム",
   "fish.no_film": "このブラウザーでは動画を再生できないため、背景を表示しています。", "fish.no_webgl": "このブラウザーはWebGL 2に対応していないため、動画で表示しています。視点は変えられません。", "fish.film.label": "バーチャルフィッシュの動画",
@@ -265,7 +265,7 @@ export default {
   "fish.turn": "回転と拡大", "fish.turn.left": "左へ回す", "fish.turn.right": "右へ回す", "fish.turn.up": "上へ回す", "fish.turn.down": "下へ回す", "fish.turn.nearer": "近づく", "fish.turn.farther": "離れる", "fish.turn.reset": "視点を元に戻す",
   "fish.keys": "ドラッグで回転、ホイールか2本の指で拡大と縮小。キー操作：スペースキーで再生、← →で1フレーム（Shiftと同時に押すと10フレーム）、HomeとEndで最初と最後、+と−で拡大と縮小、0で視点を元に戻します。", "fish.keys.flat": "キー操作：スペースキーで再生、← →で1フレーム（Shiftと同時に押すと10フレーム）、HomeとEndで最初と最後。",
   "fish.options": "別の設定で作成", "fish.papers": "論文の手法", "fish.papers.help": "中嶋らの論文の魚は、体が曲がらず、傾きません。値の平滑化も行いません。",
-  "set.palette": "体色", "set.palette.goldfish": "金魚", "set.palette.silver": "銀色", "set.palette.bronze": "青銅色", "set.swim": "体を曲げて泳ぐ", "set.bank_rad": "旋回時の傾きの上限（度）",
+  "set.body": "体", "set.body.own": "撮影した動物", "set.body.goldfish": "金魚", "set.palette": "金魚の体色", "set.palette.goldfish": "金魚", "set.palette.silver": "銀色", "set.palette.bronze": "青銅色", "set.swim": "体を曲げて泳ぐ", "set.bank_rad": "旋回時の傾きの上限（度）",
   "set.smooth_s": "平滑化（秒）", "set.bridge_s": "補間する欠測の上限（秒）", "set.length_m": "体長（cm）", "set.height_m": "ひれを含む体高（cm）",
   "fish.rigid": "曲がらない", "fish.upright": "傾かない", "fish.shown": "表示中",
   "fish.files": "ダウンロード", "fish.files.help": "3DモデルはBlenderやUnityなどで開けます。動画では、動物のいない背景の前を魚が泳ぎます。",

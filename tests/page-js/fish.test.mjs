@@ -18,6 +18,19 @@ test("a fish has its mesh, joints and a posture for every frame", () => {
   close([lengthOf(fish), fish.yfov], [0.1, Math.PI / 2]);
 });
 
+test("a flat animal has a picture and no body", async () => {
+  const flat = (root) => {
+    const [{ attributes, indices }] = root.meshes[0].primitives;
+    const { COLOR_0, ...others } = attributes;
+    root.meshes[0].primitives = [{ attributes: { ...others, TEXCOORD_0: attributes.POSITION }, indices }];
+    root.images = [{ bufferView: 0, mimeType: "image/png" }];
+  };
+  const fish = readGlb(glbFile(flat));
+  assert.deepEqual([fish.body.length, fish.fins.length, fish.vertices.color], [0, 3, null]);
+  assert.deepEqual([fish.picture.type, fish.picture.size, fish.vertices.place.length], ["image/png", 36, 9]);
+  assert.equal(readGlb(glbFile()).picture, null);
+});
+
 test("other files are refused", () => {
   const refused = (file) => assert.throws(() => readGlb(file), NotAFish);
   refused(new ArrayBuffer(0));
@@ -125,5 +138,6 @@ test("sizes are shown in centimetres, around the size of the measured animal", (
 
 test("files are saved under a name that a person understands", () => {
   assert.equal(savedName("goldfish <b>one", { palette: "silver", swim: true }, "glb"), "goldfish-b-one-virtual-fish-silver.glb");
+  assert.equal(savedName("koi", { body: "own", palette: "silver" }, "mp4"), "koi-virtual-fish-own.mp4");
   assert.equal(savedName("../", { palette: "bronze", swim: false }, "mp4"), "film-virtual-fish-bronze-rigid.mp4");
 });

@@ -186,7 +186,8 @@ def test_drag_wheel_buttons_and_keys_turn_the_fish(gl_page, fish):
 
 def test_another_fish_is_made_with_other_options_and_saved_under_a_human_name(gl_page, fish):
     open_fish(gl_page, fish)
-    gl_page.get_by_label("Colors", exact=True).select_option("silver")
+    gl_page.get_by_label("Body", exact=True).select_option("goldfish")
+    gl_page.get_by_label("Colors of the goldfish", exact=True).select_option("silver")
     gl_page.get_by_role("button", name="As in the paper").click()
     expect(gl_page.get_by_role("checkbox", name="The body bends")).not_to_be_checked()
     gl_page.get_by_role("button", name="Make this fish too").click()

@@ -180,10 +180,16 @@ fn compare(stored: &StoredLibrary) {
 
 /// Makes a virtual fish as `fish` does.
 fn swim(library: &Library) {
-    if let Ok(motion) = fish::drive(&library.poses, &fish::Params::default()) {
-        glb::write(&motion);
-        let film = fish::Film::new(motion, library.background.clone());
-        film.render(0, &mut Frame::default());
+    for body in [fish::Body::Own, fish::Body::Goldfish] {
+        let params = fish::Params {
+            body,
+            ..fish::Params::default()
+        };
+        if let Ok(film) = fish::Film::of(library, &params) {
+            glb::write(film.motion(), film.renderer().mesh());
+            film.render(0, &mut Frame::default());
+            fish::likeness(library, &film);
+        }
     }
 }
 

@@ -67,10 +67,9 @@ pub(super) fn fish(bytes: &[u8]) {
         return;
     };
     let library = library::small();
-    if let Ok(motion) = fish::drive(&library.poses, &params) {
-        let model = glb::write(&motion);
+    if let Ok(film) = fish::Film::of(library, &params) {
+        let model = glb::write(film.motion(), film.renderer().mesh());
         assert!(model.starts_with(b"glTF"));
-        let film = fish::Film::new(motion, library.background.clone());
         film.render(0, &mut Frame::default());
     }
 }

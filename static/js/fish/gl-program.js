@@ -21,11 +21,14 @@ layout(location = 1) in vec3 normal;
 layout(location = 2) in vec4 color;
 layout(location = 3) in uvec4 joints;
 layout(location = 4) in vec4 weights;
+layout(location = 5) in vec2 spot;
 out vec3 rest, place, facing;
 out vec4 tint;
+out vec2 at;
 void main() {
   mat4 bent = skin[joints.x] * weights.x + skin[joints.y] * weights.y;
   rest = position;
+  at = spot;
   place = (bent * vec4(position, 1)).xyz;
   facing = mat3(bent) * normal;
   tint = vec4(pow(color.rgb, vec3(1.0 / 2.2)), color.a);
@@ -36,12 +39,19 @@ void main() {
 const LIT = `#version 300 es
 precision highp float;
 uniform vec3 eye;
-uniform bool isFin;
+uniform bool isFin, isPicture;
+uniform sampler2D picture;
 in vec3 rest, place, facing;
 in vec4 tint;
+in vec2 at;
 out vec4 shown;
 const vec3 KEY = vec3(-0.34, 0.80, 0.495);
 void main() {
+  if (isPicture) { // It was taken in the light of the film.
+    vec4 texel = texture(picture, at);
+    shown = vec4(texel.rgb, 1) * (isFin ? texel.a : 1.0);
+    return;
+  }
   vec3 toEye = normalize(eye - place), n = normalize(facing);
   if (isFin && dot(n, toEye) < 0.0) n = -n;
   float wrapped = max((dot(n, KEY) + 0.35) / 1.35, 0.0);
@@ -60,10 +70,12 @@ void main() {
 const WIREFRAME = `#version 300 es
 precision highp float;
 uniform vec3 eye;
-uniform bool isFin;
+uniform bool isFin, isPicture;
+uniform sampler2D picture;
 uniform float ring, slice; // distance of two lines: along the body in metres, around it in radians
 in vec3 rest, place, facing;
 in vec4 tint;
+in vec2 at;
 out vec4 shown;
 float near(float value) {
   float step = fwidth(value);
@@ -76,6 +88,7 @@ void main() {
   if (!isFin) pixels = min(pixels, side / fwidth(side) * 0.7);
   float line = 1.0 - smoothstep(0.5, 1.2, pixels), halo = 1.0 - smoothstep(1.0, 2.6, pixels);
   float strength = isFin ? 0.7 : 1.0;
+  if (isFin && isPicture) strength *= smoothstep(0.2, 0.6, texture(picture, at).a);
   vec4 dark = vec4(0.02, 0.07, 0.09, 1) * (0.12 + 0.5 * halo) * strength;
   shown = mix(dark, vec4(0.55, 0.96, 1.0, 1), line * strength);
 }`;

@@ -1,5 +1,5 @@
-// Draws the virtual fish with WebGL 2, without a library: its file has one skinned mesh with vertex colors and no
-// pictures, so that a general reader and its blob: addresses are not needed.
+// Draws the virtual fish with WebGL 2, without a library: its file has one skinned mesh with vertex colors or one
+// picture, so that a general reader is not needed.
 // @ts-check
 import { programs } from "./gl-program.js";
 
@@ -18,11 +18,12 @@ export function fishDrawer(canvas, fish) {
   const context = canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true });
   if (!context) return null;
   const gl = context;
-  let made = build(gl, fish);
+  let made = build(gl, fish, again);
   /** @type {Scene | null} */
   let last = null;
   const onLost = (/** @type {Event} */ event) => event.preventDefault();
-  const onRestored = () => { made = build(gl, fish); if (last) draw(last); };
+  const onRestored = () => { made = build(gl, fish, again); again(); };
+  function again() { if (last) draw(last); }
   canvas.addEventListener("webglcontextlost", onLost);
   canvas.addEventListener("webglcontextrestored", onRestored);
 
@@ -41,6 +42,8 @@ export function fishDrawer(canvas, fish) {
     gl.uniform3fv(kind.at("eye"), scene.eye);
     gl.uniform1f(kind.at("ring"), scene.ring ?? 1);
     gl.uniform1f(kind.at("slice"), scene.slice ?? 1);
+    gl.uniform1i(kind.at("isPicture"), fish.picture ? 1 : 0);
+    gl.bindTexture(gl.TEXTURE_2D, made.picture);
     gl.bindVertexArray(made.mesh);
     for (const isFin of [false, true]) {
       gl.uniform1i(kind.at("isFin"), isFin ? 1 : 0);
@@ -77,8 +80,8 @@ export function fishDrawer(canvas, fish) {
   return { draw, dispose };
 }
 
-/** Fills a new or restored context. @param {WebGL2RenderingContext} gl @param {import("./glb.js").VirtualFish} fish */
-function build(gl, { vertices, body, fins }) {
+/** Fills a new or restored context. @param {WebGL2RenderingContext} gl @param {import("./glb.js").VirtualFish} fish @param {() => void} onPicture */
+function build(gl, { vertices, picture, body, fins }, onPicture) {
   const kinds = programs(gl);
   const mesh = gl.createVertexArray();
   gl.bindVertexArray(mesh);
@@ -91,12 +94,18 @@ function build(gl, { vertices, body, fins }) {
   gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
   put(1, vertices.normal);
   gl.vertexAttribPointer(1, 3, gl.FLOAT, false, 0, 0);
-  put(2, vertices.color);
-  gl.vertexAttribPointer(2, 4, gl.UNSIGNED_SHORT, true, 0, 0);
+  if (vertices.color) {
+    put(2, vertices.color);
+    gl.vertexAttribPointer(2, 4, gl.UNSIGNED_SHORT, true, 0, 0);
+  }
   put(3, vertices.joints);
   gl.vertexAttribIPointer(3, 4, gl.UNSIGNED_BYTE, 0, 0);
   put(4, vertices.weights);
   gl.vertexAttribPointer(4, 4, gl.FLOAT, false, 0, 0);
+  if (vertices.place) {
+    put(5, vertices.place);
+    gl.vertexAttribPointer(5, 2, gl.FLOAT, false, 0, 0);
+  }
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
   const triangles = new Uint32Array(body.length + fins.length);
   triangles.set(body);
@@ -113,5 +122,21 @@ function build(gl, { vertices, body, fins }) {
   gl.depthFunc(gl.LEQUAL);
   gl.enable(gl.BLEND);
   gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-  return { ...kinds, mesh, drawn, points };
+  return { ...kinds, mesh, drawn, points, picture: picture && textureOf(gl, picture, onPicture) };
+}
+
+/** Returns a texture that is transparent until its picture is read. @param {WebGL2RenderingContext} gl @param {Blob} picture @param {() => void} onPicture */
+function textureOf(gl, picture, onPicture) {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
+  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+  for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);
+  createImageBitmap(picture, { premultiplyAlpha: "none" }).then((bitmap) => {
+    if (gl.isContextLost()) return;
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
+    onPicture();
+  }, () => {});
+  return texture;
 }

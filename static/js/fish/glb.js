@@ -6,14 +6,14 @@ const MAGIC = 0x46546c67;
 const CHUNK = { json: 0x4e4f534a, bytes: 0x004e4942 };
 /** Array types by the glTF code of their component. */
 const ARRAYS = /** @type {Record<number, any>} */ ({ 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array });
-const WIDTHS = /** @type {Record<string, number>} */ ({ SCALAR: 1, VEC3: 3, VEC4: 4, MAT4: 16 });
+const WIDTHS = /** @type {Record<string, number>} */ ({ SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT4: 16 });
 /** Most joints that the page draws; a fish has 8. */
 export const MOST_JOINTS = 8;
 
 /**
- * @typedef {{position: Float32Array, normal: Float32Array, color: Uint16Array, joints: Uint8Array, weights: Float32Array}} Vertices
- *   in metres, y up; colors are linear, 65535 = 1
- * @typedef {{vertices: Vertices, body: Uint32Array, fins: Uint32Array, offsets: number[][], inverse: Float32Array,
+ * @typedef {{position: Float32Array, normal: Float32Array, color: Uint16Array | null, place: Float32Array | null, joints: Uint8Array, weights: Float32Array}} Vertices
+ *   in metres, y up; colors are linear, 65535 = 1; place: in the picture, null = colors
+ * @typedef {{vertices: Vertices, picture: Blob | null, body: Uint32Array, fins: Uint32Array, offsets: number[][], inverse: Float32Array,
  *   nFrames: number, places: Float32Array, turns: Float32Array, bends: Float32Array[], shown: Float32Array | null,
  *   yfov: number | null}} VirtualFish
  *   offsets: each joint from the one before it; shown: 1 or 0 in x of each frame, null = always;
@@ -55,9 +55,13 @@ function fishOf({ root, bytes }) {
     const start = (root.bufferViews[bufferView].byteOffset ?? 0) + byteOffset;
     return new ARRAYS[componentType](bytes, start, count * WIDTHS[type]);
   };
-  const [body, fins] = root.meshes[0].primitives;
-  const of = body.attributes;
-  const vertices = { position: read(of.POSITION), normal: read(of.NORMAL), color: read(of.COLOR_0), joints: read(of.JOINTS_0), weights: read(of.WEIGHTS_0) };
+  // An animal seen from above is flat: it has no body but its sheet.
+  const surfaces = root.meshes[0].primitives;
+  const [body, fins] = surfaces.length > 1 ? surfaces : [null, surfaces[0]];
+  const of = fins.attributes;
+  const colors = (/** @type {string} */ name) => (of[name] === undefined ? null : read(of[name]));
+  const image = root.images?.[0];
+  const vertices = { position: read(of.POSITION), normal: read(of.NORMAL), color: colors("COLOR_0"), place: colors("TEXCOORD_0"), joints: read(of.JOINTS_0), weights: read(of.WEIGHTS_0) };
   const { joints, inverseBindMatrices, skeleton } = root.skins[0];
   if (joints.length > MOST_JOINTS) throw new Error(`${joints.length} joints`);
   const [{ channels, samplers }] = root.animations;
@@ -69,11 +73,17 @@ function fishOf({ root, bytes }) {
   const bends = joints.map((/** @type {number} */ joint) => keys(joint, "rotation"));
   const lens = root.cameras?.[0]?.perspective;
   return {
-    vertices, body: read(body.indices), fins: read(fins.indices), inverse: read(inverseBindMatrices), nFrames, bends,
+    vertices, picture: image ? pictureOf(image, root.bufferViews, bytes) : null, body: body ? read(body.indices) : new Uint32Array(0), fins: read(fins.indices), inverse: read(inverseBindMatrices), nFrames, bends,
     offsets: joints.map((/** @type {number} */ joint) => root.nodes[joint].translation ?? [0, 0, 0]),
     places: known(keys(skeleton, "translation"), 3 * nFrames), turns: known(keys(skeleton, "rotation"), 4 * nFrames),
     shown: keys(skeleton, "scale"), yfov: lens?.yfov ?? null,
   };
+}
+
+/** @param {{bufferView: number, mimeType: string}} image @param {any[]} views @param {ArrayBuffer} bytes */
+function pictureOf({ bufferView, mimeType }, views, bytes) {
+  const { byteOffset = 0, byteLength } = views[bufferView];
+  return new Blob([bytes.slice(byteOffset, byteOffset + byteLength)], { type: mimeType });
 }
 
 /** @template {ArrayLike<any>} T @param {T | null} values @param {number} length @returns {T} */

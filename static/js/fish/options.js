@@ -11,7 +11,7 @@ import { loadFields } from "../studio/schema.js";
 import { changedFrom, PAPERS, shownAs } from "./settings.js";
 
 /** Names in the order of use; the service may tell more. */
-const ORDER = ["palette", "swim", "bank_rad", "smooth_s", "bridge_s", "length_m", "height_m"];
+const ORDER = ["body", "palette", "swim", "bank_rad", "smooth_s", "bridge_s", "length_m", "height_m"];
 
 /**
  * @param {{library: Api.Library, params: Api.FishParams | null, life: AbortSignal, onMade: (id: string) => void}} options params: of the fish that is shown, null = none

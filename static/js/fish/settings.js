@@ -28,8 +28,8 @@ export function changedFrom(params, fields) {
   return Object.fromEntries(Object.entries(params ?? {}).filter(([name, value]) => fields.has(name) && value !== undefined && value !== null && value !== /** @type {Field} */ (fields.get(name)).default));
 }
 
-/** Returns the name under which a file is saved, such as "goldfish-virtual-fish-silver.glb". @param {string} film @param {Api.FishParams} params @param {string} ending */
-export function savedName(film, { palette, swim }, ending) {
+/** Returns the name under which a file is saved, such as "goldfish-virtual-fish-silver.glb"; the filmed animal itself is "own". @param {string} film @param {Api.FishParams} params @param {string} ending */
+export function savedName(film, { body, palette, swim }, ending) {
   const stem = film.replace(/[^\p{L}\p{N}._-]+/gu, "-").replace(/^[-.]+|-+$/g, "") || "film";
-  return `${stem}-virtual-fish-${palette}${swim === false ? "-rigid" : ""}.${ending}`;
+  return `${stem}-virtual-fish-${body === "own" ? body : palette}${swim === false ? "-rigid" : ""}.${ending}`;
 }

@@ -41,7 +41,7 @@ async function save(event, href, download) {
 }
 
 /** Returns what a virtual fish is, in a few words. @param {Api.Fish} fish */
-const fishName = ({ params }) => [choiceOf("palette", params.palette ?? ""), params.swim === false && say("fish.rigid"), params.bank_rad === 0 && say("fish.upright")].filter(Boolean).join(", ");
+const fishName = ({ params }) => [params.body === "own" ? choiceOf("body", "own") : choiceOf("palette", params.palette ?? ""), params.swim === false && say("fish.rigid"), params.bank_rad === 0 && say("fish.upright")].filter(Boolean).join(", ");
 
 /**
  * Returns the table of the fish of a film with their downloads.

@@ -7,6 +7,7 @@ use std::time::UNIX_EPOCH;
 
 use flockreel::media::VideoWriter;
 use flockreel_core::fish::film::Film;
+use flockreel_core::fish::mesh::Mesh;
 use flockreel_core::fish::sample::{SampleFilm, SampleParams};
 use flockreel_core::footage::{FootageFormat, FrameSource};
 use flockreel_core::raster::{Frame, RgbImage};
@@ -34,7 +35,9 @@ fn swim_masks() -> Vec<u8> {
         ..SampleParams::default()
     };
     let film = SampleFilm::new(params).unwrap();
-    let fish = Film::new(film.motion().clone(), film.background().clone());
+    let motion = film.motion().clone();
+    let mesh = Mesh::goldfish(motion.size, params.palette);
+    let fish = Film::new(motion, mesh, film.background().clone());
     encoded(&film.format(), |k, frame| {
         let drawing = fish.draw(k);
         let mut picture = RgbImage::new(frame.width, frame.height);

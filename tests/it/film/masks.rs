@@ -5,7 +5,9 @@ use std::sync::Arc;
 use flockreel_core::analysis::{Error, Params, analyze};
 use flockreel_core::code::Code;
 use flockreel_core::cpu::Level;
+use flockreel_core::fish::Palette;
 use flockreel_core::fish::film::Film;
+use flockreel_core::fish::mesh::Mesh;
 use flockreel_core::footage::Masked;
 use flockreel_core::library::Library;
 use flockreel_core::progress::Silent;
@@ -17,7 +19,9 @@ use super::staged::{HEIGHT, N_FRAMES, Staged, WIDTH, put};
 /// Returns the renderer of the fish of the plain film, to draw it over other backgrounds.
 fn fish() -> Film {
     let plain = Staged::plain();
-    Film::new(plain.motion().clone(), plain.scene().clone())
+    let motion = plain.motion().clone();
+    let mesh = Mesh::goldfish(motion.size, Palette::Goldfish);
+    Film::new(motion, mesh, plain.scene().clone())
 }
 
 /// Returns a film of the fish before moving waves, which no static background describes.

@@ -10,7 +10,7 @@ use flockreel_core::analysis::params::{AnimalParams, CameraParams};
 use flockreel_core::analysis::{self, analyze};
 use flockreel_core::cpu::Level;
 use flockreel_core::fish::sample::{SampleFilm, SampleParams};
-use flockreel_core::fish::{Params, drive};
+use flockreel_core::fish::{Film, Params, drive, likeness};
 use flockreel_core::footage::FrameSource;
 use flockreel_core::formats::library_dir;
 use flockreel_core::formats::library_json::FootageSummary;
@@ -83,7 +83,7 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 #[test]
 fn virtual_fish_follows_the_filmed_one() {
     let (film, library, _) = filmed();
-    let motion = drive(&library.poses, &Params::default()).unwrap();
+    let motion = drive(&library.poses, &Params::default(), None).unwrap();
     let both = motion.frames.iter().zip(&film.motion().frames);
     let seen: Vec<_> = both.filter(|(got, _)| got.visible).collect();
     assert!(seen.len() > N_FRAMES * 9 / 10, "visible in {}", seen.len());
@@ -190,4 +190,14 @@ fn sample_command_writes_footage_with_a_true_pose_for_every_frame() {
     let poses = flockreel_core::formats::poses_json::read(&std::fs::read(&truth).unwrap()).unwrap();
     assert_eq!(poses.frames.len(), 12);
     assert!(poses.frames.iter().all(|pose| pose.position_m.is_some()));
+}
+
+#[test]
+fn virtual_animal_looks_like_the_filmed_one() {
+    let (_, library, _) = filmed();
+    let film = Film::of(library, &Params::default()).expect("it shows the whole animal");
+    let alike = likeness(library, &film).expect("it shows the whole animal");
+    assert!(alike.n_frames > N_FRAMES / 2, "{alike:?}");
+    assert!(alike.overlap > 0.7, "{alike:?}");
+    assert!(alike.color_levels < 20.0, "{alike:?}");
 }

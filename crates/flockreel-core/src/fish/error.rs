@@ -14,6 +14,12 @@ pub enum Error {
         /// Number of frames in the footage.
         n_frames: usize,
     },
+    /// No frame shows the whole animal, so it has no figure.
+    #[error(
+        "no frame of the library shows the whole animal, large enough and surely, so the virtual fish cannot look \
+         like it: choose `body: goldfish`, or film it whole"
+    )]
+    NoPictures,
 }
 
 impl Error {
@@ -22,6 +28,7 @@ impl Error {
         match self {
             Error::InvalidParams(_) => Code::InvalidParams,
             Error::NothingMoves { .. } => Code::NothingMoves,
+            Error::NoPictures => Code::AnimalTooSmall,
         }
     }
 }

@@ -1,7 +1,14 @@
 //! The film of a virtual fish: each posture drawn over a background, in the encoder's pixel format.
 
+use super::drive::drive;
+use super::error::Error;
+use super::figure::Figure;
+use super::mesh::Mesh;
 use super::motion::Motion;
+use super::params::{Body, Params};
 use super::render::{Drawing, Renderer};
+use crate::library::Library;
+use crate::parameters::Parameters;
 use crate::raster::{ColorSpec, Frame, RgbImage};
 
 /// Motion, renderer and background of the film of a virtual fish.
@@ -14,9 +21,24 @@ pub struct Film {
 }
 
 impl Film {
+    /// Returns the film of the virtual animal of a library over its background.
+    pub fn of(library: &Library, params: &Params) -> Result<Film, Error> {
+        params.check().map_err(Error::InvalidParams)?;
+        let figure = match params.body {
+            Body::Own => Some(Figure::learn(library)?),
+            Body::Goldfish => None,
+        };
+        let motion = drive(&library.poses, params, figure.as_ref())?;
+        let mesh = match &figure {
+            Some(figure) => figure.mesh(motion.size.length_m, params.height_m),
+            None => Mesh::goldfish(motion.size, params.palette),
+        };
+        Ok(Film::new(motion, mesh, library.background.clone()))
+    }
+
     /// Returns the film of a motion over a background. Panics if the background does not have the motion's
     /// image size.
-    pub fn new(motion: Motion, background: RgbImage) -> Film {
+    pub fn new(motion: Motion, mesh: Mesh, background: RgbImage) -> Film {
         let [width, height] = motion.image_size_px;
         assert_eq!(
             background.size(),
@@ -26,7 +48,7 @@ impl Film {
         let mut background_frame = Frame::new(width, height, ColorSpec::default());
         background_frame.draw_all_rgb(&background);
         Film {
-            renderer: Renderer::new(motion.size, motion.palette),
+            renderer: Renderer::new(mesh),
             motion,
             background,
             background_frame,

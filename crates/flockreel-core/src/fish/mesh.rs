@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::spine::{JointWeights, ORIGIN_S, SPINE_DOWN_BL};
 use crate::library::Animal;
+use crate::raster::RgbaImage;
 
 /// Look of a point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,8 +19,8 @@ pub struct Material {
     pub color: [f32; 4],
     /// Shininess, 0..=1.
     pub shine: f32,
-    /// Texture coordinates. On the body: row and column of scales. On a fin: ray, and position from base to
-    /// edge.
+    /// Texture coordinates. With a picture: position in it, 0..=1 across and down. Without one, on the body: row
+    /// and column of scales; on a fin: ray, and position from base to edge.
     pub grain: [f32; 2],
     /// Strength of the texture: > 0 scales, < 0 fin rays, 0 none.
     pub grain_depth: f32,
@@ -49,6 +50,8 @@ pub struct Mesh {
     pub fins: Vec<[u32; 3]>,
     /// Size of the fish.
     pub size: Animal,
+    /// Picture on the surface; `None` if the vertices have their colors.
+    pub picture: Option<RgbaImage>,
 }
 
 impl Mesh {
@@ -110,13 +113,27 @@ impl MeshBuilder {
 
     /// Returns the mesh, scaled to `size`.
     pub(super) fn finish(self, size: Animal) -> Mesh {
-        let points = self.points.iter();
-        let mut vertices: Vec<Vertex> = points.map(|p| vertex(p, size.length_m)).collect();
-        let [top, bottom] = extent(&vertices, 1);
-        let scale = size.height_m / (bottom - top);
-        for vertex in &mut vertices {
-            vertex.position_m *= DVec3::new(1.0, scale, scale);
+        let (mut lo, mut hi) = (f64::MAX, f64::MIN);
+        for point in &self.points {
+            if point.material.color[3] >= 0.5 {
+                (lo, hi) = (lo.min(point.at[1]), hi.max(point.at[1]));
+            }
         }
+        self.scaled(size.length_m, size.height_m / ((hi - lo) * size.length_m))
+    }
+
+    /// Returns the mesh of a fish of `length_m`, made `stretch` times as high and as wide as it is built.
+    pub(super) fn scaled(self, length_m: f64, stretch: f64) -> Mesh {
+        let points = self.points.iter();
+        let mut vertices: Vec<Vertex> = points.map(|p| vertex(p, length_m)).collect();
+        for vertex in &mut vertices {
+            vertex.position_m *= DVec3::new(1.0, stretch, stretch);
+        }
+        let [top, bottom] = extent(&vertices, 1);
+        let size = Animal {
+            length_m,
+            height_m: bottom - top,
+        };
         let body = without_slivers(self.body, &vertices);
         let fins = without_slivers(self.fins, &vertices);
         set_normals(&mut vertices, &body);
@@ -126,6 +143,7 @@ impl MeshBuilder {
             body,
             fins,
             size,
+            picture: None,
         }
     }
 }

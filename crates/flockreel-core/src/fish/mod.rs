@@ -6,7 +6,9 @@
 
 pub mod drive;
 pub mod error;
+pub mod figure;
 pub mod film;
+pub mod likeness;
 pub mod mesh;
 pub mod motion;
 pub mod params;
@@ -25,7 +27,9 @@ mod scenery;
 
 pub use drive::drive;
 pub use error::Error;
+pub use figure::Figure;
 pub use film::Film;
+pub use likeness::{Likeness, likeness};
 pub use motion::{Motion, Posture};
-pub use params::{Palette, Params};
+pub use params::{Body, Palette, Params};
 pub use render::Renderer;

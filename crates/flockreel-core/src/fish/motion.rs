@@ -3,7 +3,6 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::params::Palette;
 use super::spine::N_JOINTS;
 use crate::geometry::Camera;
 use crate::library::Animal;
@@ -19,8 +18,6 @@ pub struct Motion {
     pub camera: Camera,
     /// Size of the fish.
     pub size: Animal,
-    /// Colors of the fish.
-    pub palette: Palette,
     /// Posture in each frame, in order.
     pub frames: Vec<Posture>,
 }

@@ -13,7 +13,10 @@ use crate::parameters::Parameters;
 #[schema(as = FishParams)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Colors of the fish.
+    /// Body of the virtual animal: the filmed one, or a goldfish that moves as it does.
+    #[default(Body::Own)]
+    pub body: Body,
+    /// Colors of the goldfish.
     #[default(Palette::Goldfish)]
     pub palette: Palette,
     /// Length from the nose to the tip of the tail, in metres. null = the length of the measured animal,
@@ -40,6 +43,16 @@ pub struct Params {
     #[default = 0.5]
     #[schema(minimum = 0, maximum = 5)]
     pub bridge_s: f64,
+}
+
+/// Body of the virtual animal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Body {
+    /// Outline and colors of the filmed animal.
+    Own,
+    /// Model of a common goldfish.
+    Goldfish,
 }
 
 /// Color scheme of the virtual fish.

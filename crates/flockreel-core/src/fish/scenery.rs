@@ -54,6 +54,13 @@ pub(super) fn tank_scene(width: u32, height: u32, seed: u64) -> RgbImage {
     scene.into_image()
 }
 
+/// Returns the floor of gravel under the camera, without the fish.
+pub(super) fn gravel_scene(width: u32, height: u32, seed: u64) -> RgbImage {
+    let mut scene = Painting::new(width, height, seed);
+    scene.floor();
+    scene.into_image()
+}
+
 struct Painting {
     width: usize,
     height: usize,
@@ -170,19 +177,37 @@ impl Painting {
             let of = |i: u64| self.random(50, k, i);
             let y = HORIZON + 0.012 + (1.03 - HORIZON) * near + 0.012 * (of(0) - 0.5);
             let size = w * (0.0018 + 0.0068 * near) * (0.55 + 0.75 * of(1));
-            let gray = 92.0 + 92.0 * of(2);
-            let warm = of(3);
-            let light = 0.70 + 0.34 * near;
-            let pebble = Pebble {
-                at: [w * (1.04 * of(4) - 0.02), y * h],
-                radii: [size * (0.95 + 0.5 * of(5)), size * 0.72],
-                color: [
-                    light * gray * (1.0 + 0.14 * warm),
-                    light * gray * (0.98 - 0.02 * warm),
-                    light * gray * (0.92 - 0.22 * warm),
-                ],
-            };
+            let pebble = self.grain(k, y * h, size, 0.70 + 0.34 * near);
             self.pebble(&pebble, 0.42 * (1.0 - near));
+        }
+    }
+
+    /// Draws a floor of pebbles of one size over the whole picture.
+    fn floor(&mut self) {
+        let (w, h) = (self.width as f64, self.height as f64);
+        self.pixels.fill([96.0, 90.0, 74.0]);
+        const N: u64 = 5200;
+        for k in 0..N {
+            let of = |i: u64| self.random(50, k, i);
+            let (y, size) = (h * (1.04 * of(0) - 0.02), w * (0.003 + 0.005 * of(1)));
+            let pebble = self.grain(k, y, size, 0.8);
+            self.pebble(&pebble, 0.3);
+        }
+    }
+
+    /// Returns pebble `k` at height `y` of the picture, at a random place across it and of a random color.
+    fn grain(&self, k: u64, y: f64, size: f64, light: f64) -> Pebble {
+        let of = |i: u64| self.random(50, k, i);
+        let gray = 92.0 + 92.0 * of(2);
+        let warm = of(3);
+        Pebble {
+            at: [self.width as f64 * (1.04 * of(4) - 0.02), y],
+            radii: [size * (0.95 + 0.5 * of(5)), size * 0.72],
+            color: [
+                light * gray * (1.0 + 0.14 * warm),
+                light * gray * (0.98 - 0.02 * warm),
+                light * gray * (0.92 - 0.22 * warm),
+            ],
         }
     }
 

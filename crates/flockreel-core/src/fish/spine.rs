@@ -45,8 +45,8 @@ pub struct Swimming {
     pub phase_turns: f64,
     /// Share of the full amplitude, 0..=1.5; small while the fish glides.
     pub effort: f64,
-    /// Turn rate to the left, in radians a second.
-    pub turn_rad_per_s: f64,
+    /// Sideways bend of the whole body, in body lengths: the factor of (s - 0.2) squared; positive = to the left.
+    pub bend_bl: f64,
 }
 
 impl Swimming {
@@ -55,7 +55,7 @@ impl Swimming {
         let amplitude = self.effort * (A0_BL + A2_BL * s * s);
         let wave = amplitude * libm::sin(TAU * (self.phase_turns - s / WAVELENGTH_BL));
         let behind = (s - 0.2).max(0.0);
-        wave + TURN_BEND_BL * self.turn_rad_per_s.clamp(-3.0, 3.0) * behind * behind
+        wave + self.bend_bl * behind * behind
     }
 
     /// Returns the joint angles that bend the spine along this curve, in radians.
@@ -64,6 +64,11 @@ impl Swimming {
             libm::atan2(self.lateral_bl(to) - self.lateral_bl(from), to - from)
         })
     }
+}
+
+/// Returns the bend of a body that turns to the left at a rate in radians a second.
+pub fn bend_of_turn_bl(turn_rad_per_s: f64) -> f64 {
+    TURN_BEND_BL * turn_rad_per_s.clamp(-3.0, 3.0)
 }
 
 /// Returns the frequency of the tail beat at a speed in body lengths a second, at most 12 Hz. Bainbridge
@@ -115,6 +120,14 @@ pub fn joint_frames(length_m: f64, angles_rad: &[f64; N_JOINTS]) -> [(DVec3, DQu
         pivot += rotation * DVec3::new((JOINT_S[j] - segment_end(j)) * length_m, 0.0, 0.0);
         frame
     })
+}
+
+/// Returns the point of the spine at `s` in the fish's own frame, in metres. `joints` are the joint frames of
+/// a fish of `length_m`.
+pub fn spine_at_m(length_m: f64, joints: &[(DVec3, DQuat); N_JOINTS], s: f64) -> DVec3 {
+    let j = JOINT_S.partition_point(|&at| at <= s).max(1) - 1;
+    let (pivot, rotation) = joints[j];
+    pivot + rotation * DVec3::new((JOINT_S[j] - s) * length_m, 0.0, 0.0)
 }
 
 /// Returns the position of joint `j` in the fish's own frame when the body is straight, in metres.
@@ -192,7 +205,7 @@ mod tests {
         Swimming {
             phase_turns,
             effort: 1.0,
-            turn_rad_per_s: 0.0,
+            bend_bl: 0.0,
         }
     }
 
@@ -235,7 +248,7 @@ mod tests {
         let turning = Swimming {
             phase_turns: 0.0,
             effort: 0.0,
-            turn_rad_per_s: 2.0,
+            bend_bl: bend_of_turn_bl(2.0),
         };
         let frames = joint_frames(0.1, &turning.joint_angles_rad());
         assert!(frames[N_JOINTS - 1].0.z > 0.002);

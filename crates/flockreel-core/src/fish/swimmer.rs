@@ -12,7 +12,7 @@ use crate::geometry::wrap_rad;
 use crate::random;
 
 /// Width, height and depth of the tank, in metres. Free choice.
-const TANK_M: [f64; 3] = [0.60, 0.36, 0.30];
+pub const TANK_M: [f64; 3] = [0.60, 0.36, 0.30];
 /// Distance from the camera to the tank's front pane, in metres. Free choice.
 pub const PANE_Z_M: f64 = 0.70;
 

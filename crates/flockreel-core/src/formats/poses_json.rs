@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::mover::MoverFile;
 use crate::analysis::Params;
 use crate::geometry::{Camera, Rect, rounded};
-use crate::library::{Animal, BeatSpan, Pose, Poses, RawPose, TailBeat, TailBeatMethod, View};
+use crate::library::{
+    Animal, BeatSpan, BodyPose, Pose, Poses, RawPose, TailBeat, TailBeatMethod, View,
+};
 
 /// Name and version of the schema.
 pub const SCHEMA: &str = "flockreel/poses@2";
@@ -209,6 +211,20 @@ struct PoseFile {
     pitch_rad: Option<f64>,
     gamma_rad: Option<f64>,
     raw: Option<RawFile>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    body: Option<BodyFile>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(transparent)]
+struct BodyFile(#[serde(with = "BodyFields")] BodyPose);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "BodyPose")]
+struct BodyFields {
+    joint_angles_rad: [f64; 8],
+    tail_tip_rad: f64,
+    fin_spread_rad: f64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -262,6 +278,13 @@ impl PoseFile {
                     gamma_rad: raw.gamma_rad.map(decimals(5)),
                 })
             }),
+            body: pose.body.map(|body| {
+                BodyFile(BodyPose {
+                    joint_angles_rad: body.joint_angles_rad.map(decimals(5)),
+                    tail_tip_rad: rounded(body.tail_tip_rad, 5),
+                    fin_spread_rad: rounded(body.fin_spread_rad, 5),
+                })
+            }),
         }
     }
 
@@ -288,6 +311,7 @@ impl PoseFile {
             pitch_rad: self.pitch_rad,
             gamma_rad: self.gamma_rad,
             raw: self.raw.map(|raw| raw.0),
+            body: self.body.map(|body| body.0),
         }
     }
 }
@@ -312,6 +336,11 @@ mod tests {
                 heading_rad: Some(-1.25),
                 forward: Some([0.6, 0.0, -0.8]),
                 ..RawPose::default()
+            }),
+            body: Some(BodyPose {
+                joint_angles_rad: [0.125; 8],
+                tail_tip_rad: -0.25,
+                fin_spread_rad: 1.5,
             }),
             ..Pose::default()
         };

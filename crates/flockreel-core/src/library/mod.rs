@@ -11,7 +11,7 @@ pub mod scale;
 pub mod sprites;
 
 pub use playback::{Jump, Patch, Playback, Transition};
-pub use pose::{Animal, BeatSpan, Pose, Poses, RawPose, TailBeat, TailBeatMethod, View};
+pub use pose::{Animal, BeatSpan, BodyPose, Pose, Poses, RawPose, TailBeat, TailBeatMethod, View};
 pub use scale::{Scale, ScaleError};
 pub use sprites::{Matte, Sprites};
 

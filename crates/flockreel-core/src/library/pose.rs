@@ -135,6 +135,20 @@ pub struct Pose {
     pub gamma_rad: Option<f64>,
     /// Pose from this frame only, before smoothing over all frames.
     pub raw: Option<RawPose>,
+    /// Bend of the body and fins; `None` unless the animal is a model.
+    pub body: Option<BodyPose>,
+}
+
+/// Bend of a body with a spine of 8 joints, and spread of its tail fin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyPose {
+    /// Angle of each joint from head to tail, radians; positive moves the part behind it to the animal's left.
+    pub joint_angles_rad: [f64; 8],
+    /// Angle between the body's axis and the line from the first joint to the tail tip, radians; positive to
+    /// the animal's left.
+    pub tail_tip_rad: f64,
+    /// Angle between the two lobes of the tail fin, seen from its root, radians.
+    pub fin_spread_rad: f64,
 }
 
 /// Estimates from one frame only (Nakajima et al., sections 5 and 6).

@@ -3,6 +3,7 @@
 pub mod blend;
 pub mod canvas;
 pub mod color;
+pub mod fill;
 pub mod frame;
 pub mod image;
 pub mod mask;

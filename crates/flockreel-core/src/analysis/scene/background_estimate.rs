@@ -4,7 +4,6 @@
 //! show the scene there. Where no sample does, `fill` continues the surroundings.
 
 use super::background::{Background, Threshold};
-use super::fill;
 use super::occupancy::Occupancy;
 use super::resting;
 use super::samples::{MIN_AGREEING, Samples};
@@ -17,6 +16,7 @@ use super::windows;
 use crate::analysis::silhouette::blocks;
 use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
+use crate::raster::fill;
 use crate::raster::{Frame, RgbImage};
 
 /// Random seed of the texture synthesis.

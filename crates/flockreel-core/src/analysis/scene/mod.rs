@@ -20,7 +20,6 @@ use crate::raster::{Frame, RgbImage};
 
 pub mod background;
 mod background_estimate;
-mod fill;
 mod ghost;
 pub mod light;
 pub mod mirror;

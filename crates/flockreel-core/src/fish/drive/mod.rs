@@ -10,18 +10,25 @@
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::error::Error;
+use super::figure::Figure;
+use super::figure::{Fit, Midline};
 use super::motion::{Motion, Posture, bank_rad, nearest_sign, rotation_of, slerp};
 use super::params::Params;
-use super::spine::{N_JOINTS, Swimming, effort_at, joint_angles_of_midline_rad, tail_beat_hz};
+use super::spine::{
+    N_JOINTS, ORIGIN_S, Swimming, bend_of_turn_bl, effort_at, joint_angles_of_midline_rad,
+    joint_frames, spine_at_m, tail_beat_hz,
+};
 use crate::geometry::Camera;
 use crate::library::{Animal, Pose, Poses, View};
 use crate::parameters::Parameters;
 
 /// Returns the motion of the virtual fish. Fails if a parameter is out of range, or if the animal was found
 /// in no frame.
-pub fn drive(poses: &Poses, params: &Params) -> Result<Motion, Error> {
+///
+/// A `figure` is the body that moves; without one it is the goldfish.
+pub fn drive(poses: &Poses, params: &Params, figure: Option<&Figure>) -> Result<Motion, Error> {
     params.check().map_err(Error::InvalidParams)?;
-    let setup = Setup::new(poses, params)?;
+    let setup = Setup::new(poses, params, figure)?;
     let measured = place_all(poses, &setup, params);
     let filled = fill_gaps(&measured, (params.bridge_s * poses.fps).round() as usize);
     let smooth = smoothed(&filled, params.smooth_s * poses.fps);
@@ -30,13 +37,13 @@ pub fn drive(poses: &Poses, params: &Params) -> Result<Motion, Error> {
         image_size_px: poses.image_size_px,
         camera: setup.camera,
         size: setup.size,
-        palette: params.palette,
         frames: swim(&smooth, poses, &setup, params),
     })
 }
 
 /// Values that are the same for all frames.
-struct Setup {
+struct Setup<'a> {
+    figure: Option<&'a Figure>,
     fps: f64,
     view: View,
     camera: Camera,
@@ -47,8 +54,8 @@ struct Setup {
     length_px: f64,
 }
 
-impl Setup {
-    fn new(poses: &Poses, params: &Params) -> Result<Setup, Error> {
+impl<'a> Setup<'a> {
+    fn new(poses: &Poses, params: &Params, figure: Option<&'a Figure>) -> Result<Setup<'a>, Error> {
         let n_frames = poses.frames.len();
         if !poses.frames.iter().any(Pose::detected) {
             return Err(Error::NothingMoves { n_frames });
@@ -58,7 +65,8 @@ impl Setup {
         let [width, height] = poses.image_size_px.map(f64::from);
         // The 90th percentile: foreshortening makes many measured lengths too short, and few are too long.
         let rank = lengths_px.len() * 9 / 10;
-        let length_px = lengths_px.get(rank).copied().unwrap_or(0.15 * width);
+        let longest_px = lengths_px.get(rank).copied().unwrap_or(0.15 * width);
+        let length_px = figure.map_or(longest_px, |figure| figure.length_px);
         let size = params.size(poses.animal);
         let camera = poses.camera.unwrap_or(Camera {
             z_min_m: ASSUMED_DISTANCE_BL * size.length_m,
@@ -67,6 +75,7 @@ impl Setup {
             medium_index: 1.0,
         });
         Ok(Setup {
+            figure,
             fps: poses.fps,
             view: poses.view,
             z_apparent_m: size.length_m * camera.focal_px() / length_px,
@@ -77,6 +86,49 @@ impl Setup {
     }
 }
 
+impl Setup<'_> {
+    /// Returns the position of a fish whose silhouette has its centroid at a point.
+    fn around_center(&self, center_m: DVec3, rotation: DQuat) -> DVec3 {
+        let center_s = self.figure.map_or(ORIGIN_S, |figure| figure.center_s);
+        center_m - rotation * DVec3::X * ((ORIGIN_S - center_s) * self.size.length_m)
+    }
+
+    /// Returns the placement of a fitted figure. Its apparent depth follows from its length.
+    fn fitted(&self, fit: &Fit) -> Placement {
+        let rotation = rotation_of(fit.yaw_rad, fit.pitch_rad, 0.0);
+        let z_apparent_m = self.size.length_m * self.camera.focal_px() / fit.length_px;
+        let center_m = self.camera.point_in_camera(fit.center_px, z_apparent_m);
+        Placement {
+            position_m: self.around_center(center_m.into(), rotation),
+            rotation,
+            joint_angles_rad: None,
+            bend: [fit.bend_bl, libm::sin(fit.yaw_rad).abs()],
+        }
+    }
+
+    /// Returns the position at which the front half of the bent spine lies on the midline, in the mean. The
+    /// measured tail is longer in some frames than in others.
+    fn on_midline(
+        &self,
+        midline: &Midline,
+        rotation: DQuat,
+        angles_rad: &[f64; N_JOINTS],
+    ) -> DVec3 {
+        let length_m = self.size.length_m;
+        let joints = joint_frames(length_m, angles_rad);
+        let gap = |s: f64| {
+            let (point_px, _) = midline.at(s * self.length_px);
+            let seen = self.camera.point_in_camera(point_px, self.z_apparent_m);
+            DVec3::from(seen) - rotation * spine_at_m(length_m, &joints, s)
+        };
+        let sum: DVec3 = FRONT_S.map(gap).into_iter().sum();
+        sum / FRONT_S.len() as f64
+    }
+}
+
+/// Positions along the body that lie on the midline. Free choice: the front half, which shows best.
+const FRONT_S: [f64; 6] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5];
+
 /// Distance of the assumed camera, in body lengths. Free choice.
 const ASSUMED_DISTANCE_BL: f64 = 10.0;
 
@@ -86,6 +138,8 @@ struct Placement {
     position_m: DVec3,
     rotation: DQuat,
     joint_angles_rad: Option<[f64; N_JOINTS]>,
+    /// Bend of a fitted body, in body lengths (see `Swimming`), and how far it shows, 0..=1; 0 if unknown.
+    bend: [f64; 2],
 }
 
 fn place_all(poses: &Poses, setup: &Setup, params: &Params) -> Vec<Option<Placement>> {
@@ -94,7 +148,9 @@ fn place_all(poses: &Poses, setup: &Setup, params: &Params) -> Vec<Option<Placem
         View::Top => Vec::new(),
     };
     let place = |(k, pose): (usize, &Pose)| {
-        let position_m = position_of(pose, setup)?;
+        if let Some(fit) = setup.figure.and_then(|figure| *figure.fits.get(k)?) {
+            return Some(setup.fitted(&fit));
+        }
         let rotation = match (setup.view, pose.forward) {
             (View::Top, _) => seen_from_above(pose.heading_rad?),
             (View::Side, Some(forward)) => upright_along(DVec3::from(forward)),
@@ -103,10 +159,17 @@ fn place_all(poses: &Poses, setup: &Setup, params: &Params) -> Vec<Option<Placem
         let midline = pose.midline_px.as_ref().filter(|_| setup.view == View::Top);
         let joint_angles_rad =
             midline.and_then(|m| joint_angles_of_midline_rad(m, pose.heading_rad?));
+        let on_midline = midline.filter(|_| pose.position_m.is_none());
+        let on_midline = on_midline.and_then(|points_px| Midline::new(points_px));
+        let position_m = match on_midline.zip(joint_angles_rad) {
+            Some((midline, angles)) => setup.on_midline(&midline, rotation, &angles),
+            None => setup.around_center(position_of(pose, setup)?, rotation),
+        };
         Some(Placement {
             position_m,
             rotation,
             joint_angles_rad,
+            bend: [0.0; 2],
         })
     };
     poses.frames.iter().enumerate().map(place).collect()
@@ -197,16 +260,21 @@ fn between(a: &Placement, b: &Placement, share: f64) -> Placement {
     Placement {
         position_m: a.position_m.lerp(b.position_m, share),
         rotation: slerp(a.rotation, b.rotation, share),
+        bend: [0, 1].map(|c| a.bend[c] + share * (b.bend[c] - a.bend[c])),
         joint_angles_rad: joints
             .map(|(a, b)| std::array::from_fn(|j| a[j] + share * (b[j] - a[j]))),
     }
 }
 
 /// Returns Gaussian means of positions and rotations over time, within each run without gaps. Joint angles
-/// stay unchanged.
+/// stay unchanged, and so does a fish that lies on a midline.
 fn smoothed(placements: &[Option<Placement>], sigma_frames: f64) -> Vec<Option<Placement>> {
     let around = |k: usize| {
         let middle = placements[k]?;
+        // A fish on a midline is placed by all of its points.
+        if middle.joint_angles_rad.is_some() {
+            return Some(middle);
+        }
         let (mut position, mut total) = (DVec3::ZERO, 0.0);
         let mut turn = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
         let unbroken = |other: usize| {
@@ -267,10 +335,13 @@ fn swim(
         let measured_hz = poses.tail_beat_hz(k);
         let beat_hz = measured_hz.unwrap_or(tail_beat_hz(speed_bl_per_s));
         phase_turns += beat_hz.min(0.45 * setup.fps) / setup.fps;
+        // Where the bend shows, it is the fitted one; where it does not, it follows from speed and turn.
+        let [bend_bl, shown] = here.bend;
+        let turn_bl = bend_of_turn_bl(moving.turn_rad_per_s);
         let swimming = Swimming {
             phase_turns,
-            effort: effort_at(speed_bl_per_s),
-            turn_rad_per_s: moving.turn_rad_per_s,
+            effort: effort_at(speed_bl_per_s) * (1.0 - shown),
+            bend_bl: turn_bl + shown * (bend_bl - turn_bl),
         };
         let roll = match setup.view {
             View::Side => bank_rad(moving.turn_rad_per_s, moving.speed_m_per_s, params.bank_rad),

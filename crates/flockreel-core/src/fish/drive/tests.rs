@@ -51,7 +51,7 @@ fn uncalibrated(view: View) -> Poses {
 #[test]
 fn motion_from_true_poses_equals_the_sample_motion() {
     let (film, poses) = truth(150);
-    let motion = drive(&poses, &Params::default()).expect("it was seen");
+    let motion = drive(&poses, &Params::default(), None).expect("it was seen");
     for (k, (got, want)) in motion.frames.iter().zip(&film.motion().frames).enumerate() {
         assert!(got.visible);
         assert!(
@@ -68,7 +68,7 @@ fn motion_from_true_poses_equals_the_sample_motion() {
 #[test]
 fn measured_values_are_unchanged_without_smoothing_and_roll() {
     let (_, poses) = truth(30);
-    let motion = drive(&poses, &Params::papers()).expect("it was seen");
+    let motion = drive(&poses, &Params::papers(), None).expect("it was seen");
     for (got, pose) in motion.frames.iter().zip(&poses.frames) {
         let (position, forward) = (pose.position_m.expect("true"), pose.forward.expect("true"));
         assert!((got.position_m - DVec3::from(position)).length() < 1e-12);
@@ -80,7 +80,7 @@ fn measured_values_are_unchanged_without_smoothing_and_roll() {
 #[test]
 fn successive_quaternions_keep_their_sign() {
     let (_, poses) = truth(600);
-    let motion = drive(&poses, &Params::default()).expect("it was seen");
+    let motion = drive(&poses, &Params::default(), None).expect("it was seen");
     for pair in motion.frames.windows(2) {
         assert!(pair[0].rotation.dot(pair[1].rotation) > 0.9);
         assert!((pair[1].rotation.length() - 1.0).abs() < 1e-9);
@@ -93,7 +93,7 @@ fn short_gaps_are_filled_and_long_gaps_hide_the_fish() {
     for k in (20..30).chain(60..90) {
         poses.frames[k] = Pose::default();
     }
-    let motion = drive(&poses, &Params::default()).expect("it was seen");
+    let motion = drive(&poses, &Params::default(), None).expect("it was seen");
     for (k, posture) in motion.frames.iter().enumerate() {
         assert_eq!(posture.visible, !(60..90).contains(&k), "frame {k}");
     }
@@ -106,7 +106,7 @@ fn short_gaps_are_filled_and_long_gaps_hide_the_fish() {
 #[test]
 fn uncalibrated_fish_has_the_filmed_position_and_length() {
     let poses = uncalibrated(View::Side);
-    let motion = drive(&poses, &Params::default()).expect("it was seen");
+    let motion = drive(&poses, &Params::default(), None).expect("it was seen");
     for (posture, pose) in motion.frames.iter().zip(&poses.frames) {
         let [x, y] = motion
             .camera
@@ -120,7 +120,7 @@ fn uncalibrated_fish_has_the_filmed_position_and_length() {
 
 #[test]
 fn uncalibrated_turns_pass_the_camera_upright() {
-    let motion = drive(&uncalibrated(View::Side), &Params::default()).expect("it was seen");
+    let motion = drive(&uncalibrated(View::Side), &Params::default(), None).expect("it was seen");
     let facing_camera = motion.frames.iter().any(|p| p.forward().z < -0.8);
     assert!(facing_camera, "it does not flip from one side to the other");
     for pair in motion.frames.windows(2) {
@@ -134,7 +134,7 @@ fn uncalibrated_turns_pass_the_camera_upright() {
 
 #[test]
 fn top_view_shows_the_back() {
-    let motion = drive(&uncalibrated(View::Top), &Params::default()).expect("it was seen");
+    let motion = drive(&uncalibrated(View::Top), &Params::default(), None).expect("it was seen");
     for posture in &motion.frames {
         assert!(
             (posture.rotation * DVec3::Y).z > 0.999,
@@ -155,7 +155,7 @@ fn midline_bends_the_spine() {
                 .collect(),
         );
     }
-    let motion = drive(&poses, &Params::default()).expect("it was seen");
+    let motion = drive(&poses, &Params::default(), None).expect("it was seen");
     assert!(
         motion.frames[30]
             .joint_angles_rad
@@ -169,6 +169,6 @@ fn midline_bends_the_spine() {
 fn undetected_animal_is_refused() {
     let mut poses = uncalibrated(View::Side);
     poses.frames.fill(Pose::default());
-    let refused = drive(&poses, &Params::default());
+    let refused = drive(&poses, &Params::default(), None);
     assert_eq!(refused, Err(Error::NothingMoves { n_frames: 120 }));
 }

@@ -7,11 +7,9 @@
 use super::light::{Surface, shade};
 use super::mesh::{Mesh, Vertex};
 use super::motion::Posture;
-use super::params::Palette;
 use super::spine::{joint_at_rest_m, joint_frames};
 use crate::geometry::{Camera, Rect};
-use crate::library::Animal;
-use crate::raster::RgbImage;
+use crate::raster::{RgbImage, RgbaImage};
 
 /// Number of samples along each side of a pixel. Free choice.
 const SAMPLES: usize = 3;
@@ -33,11 +31,9 @@ pub struct Drawing {
 }
 
 impl Renderer {
-    /// Returns a renderer for fish of one size and palette.
-    pub fn new(size: Animal, palette: Palette) -> Renderer {
-        Renderer {
-            mesh: Mesh::goldfish(size, palette),
-        }
+    /// Returns a renderer of a mesh.
+    pub fn new(mesh: Mesh) -> Renderer {
+        Renderer { mesh }
     }
 
     /// Returns the mesh of the fish.
@@ -53,7 +49,7 @@ impl Renderer {
             Vec::new()
         };
         let rect = bounds(&points, image_size_px);
-        let mut samples = Samples::new(rect);
+        let mut samples = Samples::new(rect, self.mesh.picture.as_ref());
         if !rect.is_empty() {
             for triangle in &self.mesh.body {
                 samples.fill(&points, triangle, Samples::write_opaque);
@@ -156,7 +152,8 @@ fn far_to_near(triangles: &[[u32; 3]], points: &[Point]) -> Vec<[u32; 3]> {
 }
 
 /// Samples of a box, 3 x 3 per pixel.
-struct Samples {
+struct Samples<'a> {
+    picture: Option<&'a RgbaImage>,
     rect: Rect,
     width: usize,
     height: usize,
@@ -164,10 +161,11 @@ struct Samples {
     depth: Vec<f32>,
 }
 
-impl Samples {
-    fn new(rect: Rect) -> Samples {
+impl<'a> Samples<'a> {
+    fn new(rect: Rect, picture: Option<&'a RgbaImage>) -> Samples<'a> {
         let (width, height) = (rect.w as usize * SAMPLES, rect.h as usize * SAMPLES);
         Samples {
+            picture,
             rect,
             width,
             height,
@@ -181,7 +179,7 @@ impl Samples {
         &mut self,
         points: &[Point],
         triangle: &[u32; 3],
-        write: fn(&mut Samples, usize, f32, Surface),
+        write: fn(&mut Samples<'a>, usize, f32, Surface),
     ) {
         let [a, b, c] = triangle.map(|v| &points[v as usize]);
         let origin = [self.rect.x, self.rect.y].map(|px| (px as usize * SAMPLES) as f32);
@@ -218,18 +216,44 @@ impl Samples {
 
     /// Writes an opaque sample, which hides everything behind it.
     fn write_opaque(&mut self, at: usize, z: f32, surface: Surface) {
-        let [r, g, b] = shade(&surface);
+        let [r, g, b, _] = self.paint(&surface);
         self.depth[at] = z;
         self.color[at] = [r, g, b, 1.0];
     }
 
     /// Blends a translucent sample over the present color.
     fn blend_over(&mut self, at: usize, _z: f32, surface: Surface) {
-        let alpha = surface.material.color[3];
-        let [r, g, b] = shade(&surface);
+        let [r, g, b, alpha] = self.paint(&surface);
         let under = self.color[at];
         let over = [r * alpha, g * alpha, b * alpha, alpha];
         self.color[at] = std::array::from_fn(|k| over[k] + (1.0 - alpha) * under[k]);
+    }
+
+    /// Returns color and alpha of a sample. A picture shows the light in which the animal was filmed.
+    fn paint(&self, surface: &Surface) -> [f32; 4] {
+        let Some(picture) = self.picture else {
+            let [r, g, b] = shade(surface);
+            return [r, g, b, surface.material.color[3]];
+        };
+        let [u, v] = surface.material.grain;
+        let [w, h] = picture.size();
+        let (x, y) = (u * w as f32 - 0.5, v * h as f32 - 0.5);
+        let pixel = |dx: f32, dy: f32| {
+            let within = |v: f32, side: u32| v.clamp(0.0, side as f32 - 1.0) as u32;
+            let texel = picture.pixel(within(x.floor() + dx, w), within(y.floor() + dy, h));
+            texel.map(|c| f32::from(c) / 255.0)
+        };
+        let (fx, fy) = (x - x.floor(), y - y.floor());
+        let [a, b, c, d] = [
+            pixel(0.0, 0.0),
+            pixel(1.0, 0.0),
+            pixel(0.0, 1.0),
+            pixel(1.0, 1.0),
+        ];
+        std::array::from_fn(|k| {
+            let (upper, lower) = (a[k] + fx * (b[k] - a[k]), c[k] + fx * (d[k] - c[k]));
+            upper + fy * (lower - upper)
+        })
     }
 
     /// Returns the mean over the samples of each pixel.

@@ -4,6 +4,8 @@ use glam::DVec3;
 
 use super::*;
 use crate::fish::motion::rotation_of;
+use crate::fish::params::Palette;
+use crate::library::Animal;
 
 const SIZE: Animal = Animal {
     length_m: 0.1,
@@ -25,7 +27,7 @@ fn draw(yaw_rad: f64, pitch_rad: f64) -> Drawing {
         DVec3::new(0.0, 0.0, 0.7),
         rotation_of(yaw_rad, pitch_rad, 0.0),
     );
-    Renderer::new(SIZE, Palette::Goldfish).draw(&camera(), IMAGE_PX, &posture)
+    Renderer::new(Mesh::goldfish(SIZE, Palette::Goldfish)).draw(&camera(), IMAGE_PX, &posture)
 }
 
 /// Returns (left, top, right, bottom) and the centroid of the pixels with alpha above one half.
@@ -94,7 +96,7 @@ fn edges_are_antialiased() {
 
 #[test]
 fn invisible_and_out_of_view_fish_cover_nothing() {
-    let renderer = Renderer::new(SIZE, Palette::Silver);
+    let renderer = Renderer::new(Mesh::goldfish(SIZE, Palette::Silver));
     let upright = rotation_of(0.0, 0.0, 0.0);
     let behind = Posture::at(DVec3::new(0.0, 0.0, -0.5), upright);
     let beside = Posture::at(DVec3::new(2.0, 0.0, 0.7), upright);

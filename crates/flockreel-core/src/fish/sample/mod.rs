@@ -1,23 +1,28 @@
 //! Sample film: footage of the virtual fish in which every pose is known exactly.
 //!
-//! A goldfish swims at random in a planted tank and is filmed from the side with a little sensor noise. The
+//! A goldfish swims at random in a planted tank and is filmed from the side, or in a tank of gravel from above,
+//! with a little sensor noise. The
 //! film is shown to new users, and the analysis is tested against it
 //! (docs/explanation/algorithms.md, "Quality measures"). Each frame can be drawn independently of the
 //! others.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use glam::{DQuat, DVec3};
 use rayon::prelude::*;
 
 use super::error::Error;
 use super::film::Film;
+use super::mesh::Mesh;
 use super::motion::{Motion, Posture, bank_rad, rotation_of};
 use super::params::{Palette, Params};
 use super::render::Drawing;
-use super::scenery::tank_scene;
-use super::spine::{Swimming, effort_at};
-use super::swimmer::{self, PANE_Z_M, SwimmerState};
+use super::scenery::{gravel_scene, tank_scene};
+use super::spine::{Swimming, bend_of_turn_bl, effort_at, joint_frames, spine_at_m};
+use super::swimmer::{self, PANE_Z_M, SwimmerState, TANK_M};
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
 use crate::geometry::{Camera, Rect};
-use crate::library::{Animal, Pose, Poses, View};
+use crate::library::{Animal, BodyPose, Pose, Poses, View};
 use crate::random;
 use crate::raster::{Frame, RgbImage};
 
@@ -36,6 +41,8 @@ pub struct SampleParams {
     pub height: u32,
     /// Colors of the fish.
     pub palette: Palette,
+    /// Side from which the tank is filmed.
+    pub view: View,
     /// Standard deviation of the luma noise, in 8-bit levels, 0..=20.
     pub noise: f64,
 }
@@ -49,6 +56,7 @@ impl Default for SampleParams {
             width: 640,
             height: 480,
             palette: Palette::Goldfish,
+            view: View::Side,
             noise: 1.7,
         }
     }
@@ -57,7 +65,6 @@ impl Default for SampleParams {
 /// Sample film.
 pub struct SampleFilm {
     params: SampleParams,
-    states: Vec<SwimmerState>,
     film: Film,
     noise: Vec<i8>,
 }
@@ -82,14 +89,18 @@ impl SampleFilm {
                 medium_index: 1.0,
             },
             size,
-            palette: params.palette,
-            frames: states.iter().map(|s| posture(s, size)).collect(),
+            frames: states
+                .iter()
+                .map(|s| seen_from(params.view, posture(s, size)))
+                .collect(),
         };
-        let scene = tank_scene(width, height, params.seed);
+        let scene = match params.view {
+            View::Side => tank_scene(width, height, params.seed),
+            View::Top => gravel_scene(width, height, params.seed),
+        };
         Ok(SampleFilm {
-            film: Film::new(motion, scene),
+            film: Film::new(motion, Mesh::goldfish(size, params.palette), scene),
             noise: noise_table(params.seed, params.noise, width),
-            states,
             params,
         })
     }
@@ -118,15 +129,15 @@ impl SampleFilm {
     }
 
     /// Returns the exact poses of all frames. The silhouette consists of the pixels that the fish covers by
-    /// more than one half. Axis, extents and midline are `None`: their values depend on the definition of
-    /// the measurement.
+    /// more than one half. The midline is the image of the spine. Axis, extents and `bend_rad` are `None`:
+    /// their values depend on the definition of the measurement.
     pub fn truth(&self) -> Poses {
         let frames = (0..self.params.n_frames).into_par_iter();
         Poses {
             tail_beat: None,
             fps: self.params.fps,
             image_size_px: [self.params.width, self.params.height],
-            view: View::Side,
+            view: self.params.view,
             view_confidence: None,
             other_movers: Vec::new(),
             camera: Some(self.motion().camera),
@@ -137,8 +148,8 @@ impl SampleFilm {
 
     /// Returns the exact pose of one frame. Panics beyond the last frame.
     pub fn true_pose(&self, frame_idx: usize) -> Pose {
-        let state = &self.states[frame_idx];
-        let (position, forward) = (state.position_m, state.forward());
+        let posture = &self.motion().frames[frame_idx];
+        let (position, forward) = (posture.position_m, posture.forward());
         // Direction in which the image of the fish moves when the fish moves along `forward`.
         let toward = forward * position.z - position * forward.z;
         Pose {
@@ -149,10 +160,34 @@ impl SampleFilm {
             heading_rad: Some(libm::atan2(toward.y, toward.x)),
             position_m: Some(position.to_array()),
             forward: Some(forward.to_array()),
-            yaw_rad: Some(state.yaw_rad),
-            pitch_rad: Some(state.pitch_rad),
+            yaw_rad: Some(libm::atan2(forward.z, forward.x)),
+            pitch_rad: Some(libm::asin(forward.y.clamp(-1.0, 1.0))),
             gamma_rad: Some(libm::asin(forward.z.abs().min(1.0))),
+            midline_px: Some(self.midline_px(posture)),
+            body: Some(self.body(posture)),
             ..silhouette(&self.film.draw(frame_idx), &self.params)
+        }
+    }
+
+    /// Returns the image of 11 points of the spine, at equal distances from the nose to the tail tip.
+    fn midline_px(&self, posture: &Posture) -> Vec<[f64; 2]> {
+        let Motion { camera, size, .. } = self.motion();
+        let joints = joint_frames(size.length_m, &posture.joint_angles_rad);
+        let image = |k: usize| {
+            let at = spine_at_m(size.length_m, &joints, k as f64 / 10.0);
+            camera.image_from_camera((posture.position_m + posture.rotation * at).to_array())
+        };
+        (0..=10).map(image).collect()
+    }
+
+    fn body(&self, posture: &Posture) -> BodyPose {
+        let length_m = self.motion().size.length_m;
+        let joints = joint_frames(length_m, &posture.joint_angles_rad);
+        let tail = spine_at_m(length_m, &joints, 1.0) - joints[0].0;
+        BodyPose {
+            joint_angles_rad: posture.joint_angles_rad,
+            tail_tip_rad: libm::atan2(tail.z, -tail.x),
+            fin_spread_rad: self.film.renderer().mesh().tail_spread_rad(),
         }
     }
 
@@ -247,7 +282,7 @@ fn posture(state: &SwimmerState, size: Animal) -> Posture {
     let swimming = Swimming {
         phase_turns: state.phase_turns,
         effort: effort_at(speed_bl_per_s),
-        turn_rad_per_s: state.turn_rad_per_s,
+        bend_bl: bend_of_turn_bl(state.turn_rad_per_s),
     };
     let limit_rad = Params::default().bank_rad;
     let roll = bank_rad(state.turn_rad_per_s, state.speed_m_per_s, limit_rad);
@@ -255,6 +290,26 @@ fn posture(state: &SwimmerState, size: Animal) -> Posture {
     Posture {
         joint_angles_rad: swimming.joint_angles_rad(),
         ..Posture::at(state.position_m, rotation)
+    }
+}
+
+/// Returns the posture in the frame of the camera that films the tank. The swimmer's own frame is that of the
+/// camera at the side. The camera above has the front pane at the lower edge of its picture, and the water
+/// surface at the distance at which the other one has the pane.
+fn seen_from(view: View, posture: Posture) -> Posture {
+    if view == View::Side {
+        return posture;
+    }
+    let [_, height_m, depth_m] = TANK_M;
+    let DVec3 { x, y, z } = posture.position_m;
+    Posture {
+        position_m: DVec3::new(
+            x,
+            PANE_Z_M + 0.5 * depth_m - z,
+            y + PANE_Z_M + 0.5 * height_m,
+        ),
+        rotation: DQuat::from_xyzw(FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2) * posture.rotation,
+        ..posture
     }
 }
 

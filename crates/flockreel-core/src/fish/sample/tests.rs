@@ -89,6 +89,52 @@ fn true_heading_points_from_tail_to_head() {
 }
 
 #[test]
+fn film_from_above_shows_the_same_swimmer_over_the_floor() {
+    let side = small(60);
+    let top = SampleFilm::new(SampleParams {
+        view: View::Top,
+        ..side.params
+    });
+    let top = top.expect("the parameters are in range");
+    for k in [0, 31, 59] {
+        let (a, b) = (side.true_pose(k), top.true_pose(k));
+        let [x, y, z] = a.position_m.expect("known");
+        let [floor_x, floor_y, down] = b.position_m.expect("known");
+        assert_eq!(floor_x, x);
+        assert!((floor_y - (0.85 - z)).abs() < 1e-12);
+        assert!((down - (y + 0.88)).abs() < 1e-12);
+        // Turning left, away from the camera at the side, is turning up in the picture from above.
+        let (forward, seen) = (a.forward.expect("known"), b.forward.expect("known"));
+        assert!((seen[1] + forward[2]).abs() < 1e-9 && (seen[2] - forward[1]).abs() < 1e-9);
+        assert_eq!(a.body, b.body);
+        let [cx, cy] = b.centroid_px.expect("it is in sight");
+        let midline = b.midline_px.expect("known");
+        let off = midline.iter().map(|[px, py]| (px - cx).hypot(py - cy));
+        let off = off.fold(f64::MAX, f64::min);
+        assert!(off < 2.5, "frame {k}: {off} px");
+    }
+}
+
+#[test]
+fn tail_tip_lies_where_the_joints_say() {
+    let film = small(40);
+    for (k, posture) in film.motion().frames.iter().enumerate() {
+        let body = film.true_pose(k).body.expect("a model");
+        assert_eq!(body.joint_angles_rad, posture.joint_angles_rad);
+        // The tip lies between the directions of the first and the last segment.
+        let turned: f64 = body.joint_angles_rad.iter().sum();
+        assert!(
+            body.tail_tip_rad.abs() <= turned.abs().max(0.35),
+            "{body:?}"
+        );
+        assert!((1.0..2.2).contains(&body.fin_spread_rad), "{body:?}");
+    }
+    let swings = (0..40).map(|k| film.true_pose(k).body.expect("a model").tail_tip_rad);
+    let [low, high] = swings.fold([0.0f64; 2], |[lo, hi], a| [lo.min(a), hi.max(a)]);
+    assert!(low < -0.05 && high > 0.05, "{low} {high}");
+}
+
+#[test]
 fn noise_has_the_requested_standard_deviation() {
     let film = small(1);
     let (mut noisy, mut clean) = (Frame::default(), Frame::default());

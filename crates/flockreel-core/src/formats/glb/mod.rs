@@ -11,19 +11,20 @@ use gltf_json::camera::{Perspective, Type as CameraType};
 use gltf_json::material::{AlphaMode, PbrMetallicRoughness, StrengthFactor};
 use gltf_json::mesh::{Mode, Primitive, Semantic};
 use gltf_json::scene::UnitQuaternion;
+use gltf_json::texture::Info;
 use gltf_json::validation::Checked::Valid;
-use gltf_json::{Animation, Camera, Index, Material, Mesh, Node, Scene, Skin};
+use gltf_json::{Accessor, Animation, Camera, Index, Material, Mesh, Node, Scene, Skin, Texture};
 
 use self::pack::Packer;
+use super::picture::write_rgba;
 use crate::fish::Motion;
 use crate::fish::mesh::{Mesh as FishMesh, Vertex};
 use crate::fish::spine::{N_JOINTS, about_y, joint_at_rest_m};
 
-/// Returns the motion as the bytes of a GLB file.
-pub fn write(motion: &Motion) -> Vec<u8> {
-    let fish = FishMesh::goldfish(motion.size, motion.palette);
+/// Returns the motion of a fish as the bytes of a GLB file.
+pub fn write(motion: &Motion, fish: &FishMesh) -> Vec<u8> {
     let mut packer = Packer::default();
-    let mesh = add_mesh(&mut packer, &fish);
+    let mesh = add_mesh(&mut packer, fish);
     let first_joint = add_skeleton(&mut packer, motion);
     let skin = add_skin(&mut packer, motion, first_joint);
     let root = Index::new(ROOT);
@@ -56,11 +57,7 @@ fn add_mesh(packer: &mut Packer, fish: &FishMesh) -> Index<Mesh> {
     };
     let weights: Vec<[f32; 4]> = fish.vertices.iter().map(weights).collect();
     let joints: Vec<[u8; 4]> = fish.vertices.iter().map(joints).collect();
-    let colors: Vec<[u16; 4]> = fish
-        .vertices
-        .iter()
-        .map(|v| linear(v.material.color))
-        .collect();
+    let (look, picture) = add_look(packer, fish);
     let attributes = [
         (
             Semantic::Positions,
@@ -70,14 +67,21 @@ fn add_mesh(packer: &mut Packer, fish: &FishMesh) -> Index<Mesh> {
             Semantic::Normals,
             packer.vectors(&of(|v| v.normal.to_array())),
         ),
-        (Semantic::Colors(0), packer.colors(&colors)),
+        look,
         (Semantic::Joints(0), packer.joints(&joints)),
         (Semantic::Weights(0), packer.weights(&weights)),
     ];
-    let body = add_material(packer, "body", AlphaMode::Opaque, 0.42);
-    let fins = add_material(packer, "fins", AlphaMode::Blend, 0.6);
-    let primitives =
-        [(&fish.body, body), (&fish.fins, fins)].map(|(triangles, material)| Primitive {
+    let mut primitives = Vec::new();
+    let surfaces = [
+        (&fish.body, "body", AlphaMode::Opaque, 0.42),
+        (&fish.fins, "fins", AlphaMode::Blend, 0.6),
+    ];
+    for (triangles, name, alpha, rough) in surfaces {
+        if triangles.is_empty() {
+            continue;
+        }
+        let material = add_material(packer, name, alpha, rough, picture);
+        primitives.push(Primitive {
             attributes: attributes
                 .iter()
                 .cloned()
@@ -90,16 +94,49 @@ fn add_mesh(packer: &mut Packer, fish: &FishMesh) -> Index<Mesh> {
             mode: Valid(Mode::Triangles),
             targets: None,
         });
+    }
     packer.root.push(Mesh {
         extensions: None,
         extras: None,
-        name: Some("goldfish".into()),
-        primitives: primitives.into(),
+        name: Some("animal".into()),
+        primitives,
         weights: None,
     })
 }
 
-fn add_material(packer: &mut Packer, name: &str, alpha: AlphaMode, rough: f32) -> Index<Material> {
+/// Adds what colors the surface: a picture and its coordinates, or a color at every vertex.
+fn add_look(
+    packer: &mut Packer,
+    fish: &FishMesh,
+) -> ((Semantic, Index<Accessor>), Option<Index<Texture>>) {
+    let vertices = fish.vertices.iter();
+    let Some(picture) = &fish.picture else {
+        let colors: Vec<[u16; 4]> = vertices.map(|v| linear(v.material.color)).collect();
+        return ((Semantic::Colors(0), packer.colors(&colors)), None);
+    };
+    let places: Vec<[f32; 2]> = vertices.map(|v| v.material.grain).collect();
+    let png = write_rgba(picture.width, picture.height, &picture.pixels);
+    let image = packer.png(png);
+    let texture = packer.root.push(Texture {
+        name: None,
+        sampler: None,
+        source: image,
+        extensions: None,
+        extras: None,
+    });
+    (
+        (Semantic::TexCoords(0), packer.places(&places)),
+        Some(texture),
+    )
+}
+
+fn add_material(
+    packer: &mut Packer,
+    name: &str,
+    alpha: AlphaMode,
+    rough: f32,
+    picture: Option<Index<Texture>>,
+) -> Index<Material> {
     packer.root.push(Material {
         alpha_mode: Valid(alpha),
         double_sided: alpha == AlphaMode::Blend,
@@ -107,6 +144,12 @@ fn add_material(packer: &mut Packer, name: &str, alpha: AlphaMode, rough: f32) -
         pbr_metallic_roughness: PbrMetallicRoughness {
             metallic_factor: StrengthFactor(0.0),
             roughness_factor: StrengthFactor(rough),
+            base_color_texture: picture.map(|index| Info {
+                index,
+                tex_coord: 0,
+                extensions: None,
+                extras: None,
+            }),
             ..PbrMetallicRoughness::default()
         },
         ..Material::default()

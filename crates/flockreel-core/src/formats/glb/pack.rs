@@ -3,8 +3,9 @@
 
 use gltf_json::accessor::{ComponentType, GenericComponentType, Type};
 use gltf_json::buffer::{Buffer, Target, View};
+use gltf_json::image::MimeType;
 use gltf_json::validation::{Checked::Valid, USize64};
-use gltf_json::{Accessor, Index, Root, Value};
+use gltf_json::{Accessor, Image, Index, Root, Value};
 
 /// A GLB file under construction.
 #[derive(Default)]
@@ -55,6 +56,24 @@ impl Packer {
             .collect();
         let kind = Kind::new(ComponentType::U16, Type::Vec4, VERTICES);
         self.add(bytes, colors.len(), kind)
+    }
+
+    /// Adds positions in a picture, 0..=1 across and down.
+    pub(super) fn places(&mut self, places: &[[f32; 2]]) -> Index<Accessor> {
+        self.floats(places, Type::Vec2, VERTICES)
+    }
+
+    /// Adds a PNG picture.
+    pub(super) fn png(&mut self, png: Vec<u8>) -> Index<Image> {
+        let view = self.add_view(png, None);
+        self.root.push(Image {
+            buffer_view: Some(view),
+            mime_type: Some(MimeType("image/png".into())),
+            name: Some("animal".into()),
+            uri: None,
+            extensions: None,
+            extras: None,
+        })
     }
 
     /// Adds the joints of each vertex.
@@ -144,19 +163,24 @@ impl Packer {
         )
     }
 
-    fn add(&mut self, mut bytes: Vec<u8>, count: usize, kind: Kind) -> Index<Accessor> {
+    fn add_view(&mut self, mut bytes: Vec<u8>, target: Option<Target>) -> Index<View> {
         let view = self.root.push(View {
             buffer: Index::new(0),
             byte_length: USize64::from(bytes.len()),
             byte_offset: Some(USize64::from(self.bytes.len())),
             byte_stride: None,
             name: None,
-            target: kind.target.map(Valid),
+            target: target.map(Valid),
             extensions: None,
             extras: None,
         });
         bytes.resize(bytes.len().next_multiple_of(4), 0);
         self.bytes.append(&mut bytes);
+        view
+    }
+
+    fn add(&mut self, bytes: Vec<u8>, count: usize, kind: Kind) -> Index<Accessor> {
+        let view = self.add_view(bytes, kind.target);
         self.root.push(Accessor {
             buffer_view: Some(view),
             byte_offset: None,

@@ -4,6 +4,7 @@ use glam::{DMat4, DQuat, DVec3};
 use gltf_json::Root;
 
 use super::*;
+use crate::fish::Palette;
 use crate::fish::sample::{SampleFilm, SampleParams};
 use crate::fish::spine::joint_frames;
 
@@ -16,6 +17,11 @@ fn motion(n_frames: usize) -> Motion {
     };
     let film = SampleFilm::new(params).expect("in range");
     film.motion().clone()
+}
+
+/// Returns the file of a goldfish.
+fn written(motion: &Motion) -> Vec<u8> {
+    write(motion, &FishMesh::goldfish(motion.size, Palette::Goldfish))
 }
 
 /// Returns the two chunks of a GLB.
@@ -60,7 +66,7 @@ fn channel(root: &Root, node: u32, path: Property) -> (usize, usize) {
 #[test]
 fn joints_of_the_file_are_at_the_positions_of_the_renderer() {
     let motion = motion(12);
-    let (root, bytes) = open(&write(&motion));
+    let (root, bytes) = open(&written(&motion));
     let k = 7;
     let key = |node, path| {
         let (_, output) = channel(&root, node, path);
@@ -91,7 +97,7 @@ fn joints_of_the_file_are_at_the_positions_of_the_renderer() {
 
 #[test]
 fn inverse_bind_matrices_undo_the_joints_at_rest() {
-    let (root, bytes) = open(&write(&motion(2)));
+    let (root, bytes) = open(&written(&motion(2)));
     let skin = &root.skins[0];
     let matrices = floats(
         &root,
@@ -113,7 +119,7 @@ fn inverse_bind_matrices_undo_the_joints_at_rest() {
 
 #[test]
 fn bounds_match_the_vertices_and_indices_are_in_range() {
-    let (root, bytes) = open(&write(&motion(3)));
+    let (root, bytes) = open(&written(&motion(3)));
     for primitive in &root.meshes[0].primitives {
         let accessor = primitive.attributes[&Valid(Semantic::Positions)].value();
         let points = floats(&root, &bytes, accessor);
@@ -132,7 +138,7 @@ fn bounds_match_the_vertices_and_indices_are_in_range() {
 
 #[test]
 fn fish_is_upright_and_times_are_those_of_the_frames() {
-    let (root, bytes) = open(&write(&motion(30)));
+    let (root, bytes) = open(&written(&motion(30)));
     let (input, output) = channel(&root, ROOT, Property::Rotation);
     let times = floats(&root, &bytes, input);
     assert!((f64::from(times[29]) - 29.0 / 30.0).abs() < 1e-6);
@@ -146,7 +152,7 @@ fn fish_is_upright_and_times_are_those_of_the_frames() {
 fn only_a_fish_with_hidden_frames_has_a_scale_track() {
     let mut motion = motion(4);
     let has_scale = |motion: &Motion| {
-        let (root, _) = open(&write(motion));
+        let (root, _) = open(&written(motion));
         let channels = root.animations[0].channels.iter();
         channels
             .filter(|c| c.target.path.as_ref().unwrap() == &Property::Scale)

@@ -1,4 +1,5 @@
-//! Fills background pixels that the animal never left free with the surrounding texture
+//! Fills unknown pixels with the surrounding texture: background that the animal never left free, and parts of
+//! the animal that no frame shows
 //! (docs/explanation/algorithms.md, "Background"). The source is Efros & Leung, "Texture synthesis by
 //! non-parametric sampling", 1999.
 //!
@@ -25,11 +26,11 @@ const TOLERANCE: [u64; 2] = [11, 10];
 /// so that the sum over a window of three channels fits 32 bits.
 const WEIGHTS: [u32; 4] = [52, 34, 10, 1];
 /// Largest number of pixels filled with texture. Free choice.
-pub(super) const MAX_SAMPLED_PX: usize = 16_384;
+pub(crate) const MAX_SAMPLED_PX: usize = 16_384;
 
 /// Replaces the pixels marked unknown by texture. Equal seeds give equal bytes. Leaves the image unchanged if
 /// no pixel is known.
-pub(super) fn sample_texture(image: &mut RgbImage, unknown: &[bool], seed: u64) {
+pub(crate) fn sample_texture(image: &mut RgbImage, unknown: &[bool], seed: u64) {
     let mut hole = Hole::new(image, unknown);
     let mut n_sampled = 0;
     let mut rim = hole.rim();
@@ -220,7 +221,7 @@ fn tolerated(distance: u32) -> u32 {
 /// Replaces the pixels marked unknown without texture, from the rim inward. In each round, every unknown
 /// pixel with a known neighbor gets the mean of its known neighbors. Leaves the image unchanged if no pixel
 /// is known.
-pub(super) fn smooth(image: &mut RgbImage, unknown: &[bool]) {
+pub(crate) fn smooth(image: &mut RgbImage, unknown: &[bool]) {
     let (w, h) = (image.width as i64, image.height as i64);
     let mut open: Vec<usize> = (0..unknown.len()).filter(|&px| unknown[px]).collect();
     let mut unknown = unknown.to_vec();

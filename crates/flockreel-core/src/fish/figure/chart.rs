@@ -1,0 +1,202 @@
+//! Charts: where a point of the body lies in the picture of one frame.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use crate::library::Pose;
+
+/// Map from body coordinates to the picture of one frame.
+#[derive(Clone)]
+pub(super) enum Chart {
+    /// Flat body seen from the side.
+    Flat(Flat),
+    /// Body bent along a midline seen from above.
+    Curved {
+        /// Midline of the frame.
+        midline: Midline,
+        /// Usual length of a midline, pixels.
+        length_px: f64,
+    },
+}
+
+impl Chart {
+    /// Returns the image point of a point of the body.
+    pub(super) fn image(&self, s: f64, t: f64) -> [f64; 2] {
+        match self {
+            Chart::Flat(flat) => flat.image(s, t),
+            Chart::Curved { midline, length_px } => {
+                let ([x, y], [ux, uy]) = midline.at(s * length_px);
+                [x - t * length_px * uy, y + t * length_px * ux]
+            }
+        }
+    }
+}
+
+/// Place of a flat body seen from the side, upright and without perspective.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::fish) struct Fit {
+    /// Image point of the centroid of the figure.
+    pub(in crate::fish) center_px: [f64; 2],
+    /// Yaw in -pi..=0: 0 = to the right, -pi/2 = toward the camera, -pi = to the left. Radians.
+    pub(in crate::fish) yaw_rad: f64,
+    /// Pitch, radians; positive = nose down.
+    pub(in crate::fish) pitch_rad: f64,
+    /// Length of the body seen broadside, pixels.
+    pub(in crate::fish) length_px: f64,
+    /// Bend to the animal's left, in body lengths: the factor of (s - 0.2) squared.
+    pub(in crate::fish) bend_bl: f64,
+}
+
+impl Fit {
+    /// Returns a body broadside at the centroid and heading of a pose; `None` without a heading.
+    pub(super) fn start(pose: &Pose, length_px: f64) -> Option<Fit> {
+        let heading_rad = pose.heading_rad?;
+        Some(Fit {
+            center_px: pose.centroid_px?,
+            yaw_rad: if heading_rad.abs() < FRAC_PI_2 {
+                0.0
+            } else {
+                -PI
+            },
+            pitch_rad: libm::asin(libm::sin(heading_rad)),
+            length_px,
+            bend_bl: 0.0,
+        })
+    }
+
+    /// Returns whether the animal faces right.
+    pub(super) fn faces_right(&self) -> bool {
+        self.yaw_rad > -FRAC_PI_2
+    }
+
+    /// Returns the map between body and picture for a figure with its centroid at `center_s`.
+    pub(super) fn flat(&self, center_s: f64) -> Flat {
+        let (sin_yaw, cos_yaw) = (libm::sin(self.yaw_rad), libm::cos(self.yaw_rad));
+        let (sin, cos) = (libm::sin(self.pitch_rad), libm::cos(self.pitch_rad));
+        Flat {
+            center_px: self.center_px,
+            center_s,
+            along_px: [-cos_yaw * cos, -sin].map(|v| v * self.length_px),
+            across_px: [-cos_yaw * sin, cos].map(|v| v * self.length_px),
+            bent_px: -sin_yaw * self.length_px * self.bend_bl,
+        }
+    }
+
+    /// Moves the center by body coordinates, and makes the unit of length `scale` times as long.
+    pub(super) fn rebase(&mut self, [ds, dt]: [f64; 2], scale: f64) {
+        self.bend_bl = 0.0;
+        self.center_px = self.flat(0.0).image(ds, dt);
+        self.length_px *= scale;
+    }
+}
+
+/// Map between a flat, bent body and the picture.
+#[derive(Clone)]
+pub(super) struct Flat {
+    center_px: [f64; 2],
+    center_s: f64,
+    /// Image of one body length along the body (to the tail).
+    along_px: [f64; 2],
+    /// Image of one body length across the body (to the belly).
+    across_px: [f64; 2],
+    /// How far the bend moves a point one body length behind the stiff head, to the right.
+    bent_px: f64,
+}
+
+impl Flat {
+    /// Returns the image point of a point of the body.
+    pub(super) fn image(&self, s: f64, t: f64) -> [f64; 2] {
+        let ds = s - self.center_s;
+        let at = |c: usize| self.center_px[c] + ds * self.along_px[c] + t * self.across_px[c];
+        [at(0) + self.bent_px * stiff(s) * stiff(s), at(1)]
+    }
+
+    /// Returns the body coordinates at an image point; `None` where the bent body folds, and for a body without
+    /// area.
+    pub(super) fn body_at(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        let ([ax, ay], [bx, by]) = (self.along_px, self.across_px);
+        let det = ax * by - ay * bx;
+        if det.abs() < 1e-6 {
+            return None;
+        }
+        let (dx, dy) = (x - self.center_px[0], y - self.center_px[1]);
+        // Straight, the point would lie at `from`; the bend solves u + pull u^2 = from.
+        let from = stiff(self.center_s + (dx * by - dy * bx) / det);
+        let pull = self.bent_px * by / det;
+        let root = 1.0 + 4.0 * pull * from;
+        let behind = if pull.abs() < 1e-9 || from == 0.0 {
+            from
+        } else if root >= 0.0 {
+            (root.sqrt() - 1.0) / (2.0 * pull)
+        } else {
+            return None;
+        };
+        let dx = dx - self.bent_px * behind * behind;
+        let s = self.center_s + (dx * by - dy * bx) / det;
+        Some([s, (ax * dy - ay * dx) / det])
+    }
+}
+
+/// Returns the distance behind the stiff head, body lengths; 0 in the head.
+fn stiff(s: f64) -> f64 {
+    (s - 0.2).max(0.0)
+}
+
+/// Midline with the distance of each point from the head.
+#[derive(Clone)]
+pub(in crate::fish) struct Midline {
+    points_px: Vec<[f64; 2]>,
+    along_px: Vec<f64>,
+}
+
+impl Midline {
+    /// Returns the midline; `None` if it has no length.
+    pub(in crate::fish) fn new(points_px: &[[f64; 2]]) -> Option<Midline> {
+        let mut along_px = vec![0.0];
+        for pair in points_px.windows(2) {
+            let step = (pair[1][0] - pair[0][0]).hypot(pair[1][1] - pair[0][1]);
+            along_px.push(along_px[along_px.len() - 1] + step);
+        }
+        let has_length = points_px.len() > 1 && *along_px.last()? > 0.0;
+        has_length.then(|| Midline {
+            points_px: points_px.to_vec(),
+            along_px,
+        })
+    }
+
+    /// Returns the length, pixels.
+    pub(super) fn length_px(&self) -> f64 {
+        self.along_px[self.along_px.len() - 1]
+    }
+
+    /// Returns the point at a distance from the head and the unit vector toward the tail there. Both ends go on
+    /// straight.
+    pub(in crate::fish) fn at(&self, distance_px: f64) -> ([f64; 2], [f64; 2]) {
+        let after = self.along_px.partition_point(|&along| along < distance_px);
+        let k = after.clamp(1, self.points_px.len() - 1);
+        let span = (self.along_px[k] - self.along_px[k - 1]).max(1e-9);
+        let share = (distance_px - self.along_px[k - 1]) / span;
+        let (a, b) = (self.points_px[k - 1], self.points_px[k]);
+        let point = [0, 1].map(|c| a[c] + share * (b[c] - a[c]));
+        // The direction turns evenly from one middle of a segment to the next.
+        let before = self.direction(k - 1, k.saturating_sub(2));
+        let next = self.direction(k - 1, k);
+        let here = self.direction(k - 1, k - 1);
+        let away = (share - 0.5).clamp(-0.5, 0.5);
+        let other = if away < 0.0 { before } else { next };
+        let mixed = [0, 1].map(|c| here[c] + away.abs() * (other[c] - here[c]));
+        let length = mixed[0].hypot(mixed[1]).max(1e-9);
+        (point, mixed.map(|v| v / length))
+    }
+
+    /// Returns the direction of segment `k`, or of segment `fallback` if there is none.
+    fn direction(&self, fallback: usize, k: usize) -> [f64; 2] {
+        let k = if k + 1 < self.points_px.len() {
+            k
+        } else {
+            fallback
+        };
+        let (a, b) = (self.points_px[k], self.points_px[k + 1]);
+        let length = (b[0] - a[0]).hypot(b[1] - a[1]).max(1e-9);
+        [(b[0] - a[0]) / length, (b[1] - a[1]) / length]
+    }
+}
