@@ -6,6 +6,7 @@
 use super::around::{Around, Shape};
 use super::coat::Coat;
 use super::cut::{Cut, mean_gap};
+use super::ground::Ground;
 use super::{BAND_PX, MARGIN_PX, Matte, View, over_box, painted};
 use crate::analysis::scene::background::Background;
 use crate::analysis::silhouette::{self, Difference};
@@ -40,8 +41,7 @@ impl Seen {
             (view.ignored.iter()).for_each(|ignored| difference.clear(*ignored));
             let silhouette = over_box(silhouette, rect);
             let cut = Cut {
-                difference: &difference,
-                background: view.background,
+                ground: Ground::new(&difference, view.background),
                 coat: view.coat,
                 silhouette: &silhouette,
                 mean_gap: mean_gap(&difference),
@@ -111,8 +111,7 @@ impl Seen {
     /// Cuts the animal out again, with the animal in the frames around; `None` where that changes nothing.
     pub fn pull(&self, background: &Background, coat: &Coat, around: &[Around]) -> Option<Matte> {
         let cut = Cut {
-            difference: &self.difference,
-            background,
+            ground: Ground::new(&self.difference, background),
             coat,
             silhouette: &self.silhouette,
             mean_gap: mean_gap(&self.difference),
