@@ -7,7 +7,7 @@
 //! surroundings. The search compares all places within `SEARCH_PX` in integer arithmetic.
 //!
 //! Two parts differ from the paper on purpose. There is no limit on the error of a match, because every pixel
-//! needs a color. Beyond [`MAX_SAMPLED_PX`] pixels [`smooth`] fills the rest: so large a hole is an unseen
+//! needs a color. Beyond `MAX_SAMPLED_PX` pixels `smooth` fills the rest: so large a hole is an unseen
 //! part of the scene, not a gap in a texture.
 
 use rayon::prelude::*;
