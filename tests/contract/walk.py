@@ -56,6 +56,9 @@ class Walk:
         footage = self.call("POST /v1/footage", body=self.film, media_type=STREAM).json()["id"]
         same = self.call("POST /v1/footage", body={"video": self.film}, media_type=FORM)
         assert same.status_code == 200 and same.json()["id"] == footage
+        poster = self.call("GET /v1/footage/{id}/poster.jpg", {"id": footage}).content
+        variant = self.call("POST /v1/footage/{id}/variants", {"id": footage}, body={"background": poster}, media_type=FORM)
+        assert variant.json()["id"] != footage
         request = {"footage_id": footage, "params": {"preset": "papers"}}
         self.call("POST /v1/analyses", body=request)
         self.call("POST /v1/analyses", body=self.film, media_type=STREAM)

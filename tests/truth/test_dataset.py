@@ -76,6 +76,9 @@ def test_stopped_data_set_goes_on_and_keeps_finished_flocks(dataset, folder):
     first = program(folder, "dataset", *WISHES, "-o", other)
     while first.poll() is None and not (other / ".work" / "flock00001.json").exists():
         time.sleep(0.005)
+    first.send_signal(signal.SIGSTOP)
+    beside = program(folder, "dataset", *WISHES, "-o", other)
+    assert "another process" in beside.communicate()[1] and beside.returncode == 2
     first.send_signal(signal.SIGKILL)
     first.communicate()
     assert not (other / "manifest.json").exists(), "the run ended before it was stopped"

@@ -3,7 +3,7 @@
 //! While a data set is being made, `.work` holds what it is made from (`request.json`), the record of each
 //! finished flock, and the parts of the COCO files. The manifest is written last, and `.work` is then removed.
 
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +15,8 @@ use flockreel_core::formats::ground_truth::{coco, yolo};
 
 /// File in the work folder that says what the data set is made from.
 const REQUEST: &str = "request.json";
+/// File in the work folder that the process which makes the data set has locked.
+const LOCK: &str = "lock";
 
 /// Reasons why a folder cannot hold a data set.
 #[derive(Debug, thiserror::Error)]
@@ -28,6 +30,9 @@ pub enum FolderError {
         .0.display()
     )]
     Other(PathBuf),
+    /// Another process makes the data set.
+    #[error("another process makes a data set in this folder; wait until it has ended: {}", .0.display())]
+    Busy(PathBuf),
     /// A file could not be read or written.
     #[error("a file of the data set could not be read or written: {0}")]
     Io(#[from] io::Error),
@@ -39,34 +44,30 @@ pub enum FolderError {
 /// The folder of a data set that is being made.
 pub(super) struct Folder {
     path: PathBuf,
+    /// Keeps other processes out until it is dropped.
+    _lock: File,
 }
 
 impl Folder {
-    /// Opens a folder for a data set that is made from what the manifest says. Creates it if absent.
+    /// Opens a folder for a data set that is made from what the manifest says. Creates it if absent. Fails while
+    /// another process makes a data set in it.
     pub(super) fn open(path: &Path, manifest: &Manifest) -> Result<Folder, FolderError> {
         fs::create_dir_all(path)?;
-        let folder = Folder { path: path.into() };
         let request = serde_json::to_vec_pretty(manifest)?;
-        match fs::read(folder.work(REQUEST)) {
-            Ok(found) if found == request => return Ok(folder),
-            Ok(_) => return Err(FolderError::Other(path.into())),
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error.into()),
-            Err(_) => {}
-        }
-        if let Some(found) = Manifest::read(path)? {
-            if found.request() != *manifest {
-                return Err(FolderError::Other(path.into()));
-            }
-        } else {
-            // A stop between the creation of `.work` and of the request leaves an empty `.work`.
-            let is_other = |entry: io::Result<fs::DirEntry>| entry.map(|e| e.file_name() != WORK);
-            let others = fs::read_dir(path)?.map(is_other);
-            if others.collect::<io::Result<Vec<bool>>>()?.contains(&true) {
-                return Err(FolderError::NotEmpty(path.into()));
-            }
-        }
+        let is_begun = is_begun(path, manifest, &request)?;
         fs::create_dir_all(path.join(WORK))?;
-        folder.write_whole(&format!("{WORK}/{REQUEST}"), &request)?;
+        let lock = File::create(path.join(WORK).join(LOCK))?;
+        lock.try_lock().map_err(|error| match error {
+            TryLockError::WouldBlock => FolderError::Busy(path.into()),
+            TryLockError::Error(error) => error.into(),
+        })?;
+        let folder = Folder {
+            path: path.into(),
+            _lock: lock,
+        };
+        if !is_begun {
+            folder.write_whole(&format!("{WORK}/{REQUEST}"), &request)?;
+        }
         Ok(folder)
     }
 
@@ -175,6 +176,29 @@ impl Folder {
         fs::write(&new, bytes)?;
         Ok(fs::rename(new, self.path.join(path))?)
     }
+}
+
+/// Returns whether the data set was begun in the folder. Fails if the folder holds something else.
+fn is_begun(path: &Path, manifest: &Manifest, request: &[u8]) -> Result<bool, FolderError> {
+    match fs::read(path.join(WORK).join(REQUEST)) {
+        Ok(found) if found == request => return Ok(true),
+        Ok(_) => return Err(FolderError::Other(path.into())),
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error.into()),
+        Err(_) => {}
+    }
+    if let Some(found) = Manifest::read(path)? {
+        if found.request() != *manifest {
+            return Err(FolderError::Other(path.into()));
+        }
+        return Ok(false);
+    }
+    // A stop between the creation of `.work` and of the request leaves a `.work` without it.
+    let is_other = |entry: io::Result<fs::DirEntry>| entry.map(|e| e.file_name() != WORK);
+    let others = fs::read_dir(path)?.map(is_other);
+    if others.collect::<io::Result<Vec<bool>>>()?.contains(&true) {
+        return Err(FolderError::NotEmpty(path.into()));
+    }
+    Ok(false)
 }
 
 /// Removes what only an unfinished data set needs. A stop may have left it in a finished one.
