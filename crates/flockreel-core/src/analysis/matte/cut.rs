@@ -9,7 +9,7 @@ use std::collections::VecDeque;
 
 use super::around::Around;
 use super::coat::Coat;
-use super::ground::Ground;
+use crate::analysis::scene::background::Background;
 use crate::analysis::silhouette::Difference;
 use crate::raster::Mask;
 use crate::raster::runs::components;
@@ -27,7 +27,8 @@ const MAX_GAP_PX: u32 = 2;
 
 /// A frame around a silhouette, with its background.
 pub(super) struct Cut<'a> {
-    pub(super) ground: Ground<'a>,
+    pub(super) difference: &'a Difference,
+    pub(super) background: &'a Background,
     pub(super) coat: &'a Coat,
     /// The silhouette in the box of the difference.
     pub(super) silhouette: &'a Mask,
@@ -112,9 +113,9 @@ impl Cut<'_> {
     fn odds(&self, k: usize, odds: &mut [f32]) -> f32 {
         if odds[k].is_nan() {
             let is_inside = self.silhouette.bits[k] == 1;
-            let is_free = self.coat.grows && self.ground.difference.levels[k] > 0;
+            let is_free = self.coat.grows && self.difference.levels[k] > 0;
             odds[k] = if is_inside || is_free {
-                let own = self.coat.log_odds(&self.ground, k);
+                let own = self.coat.log_odds(self.difference, self.background, k);
                 own.clamp(-MAX_ODDS, MAX_ODDS) + self.prior(k)
             } else {
                 -MAX_ODDS
@@ -128,7 +129,7 @@ impl Cut<'_> {
     fn prior(&self, k: usize) -> f32 {
         let side = |shows: bool| if shows { 1.0 } else { -1.0 };
         let own = side(self.silhouette.bits[k] == 1);
-        let color = &self.ground.difference.rgb.pixels[3 * k..3 * k + 3];
+        let color = &self.difference.rgb.pixels[3 * k..3 * k + 3];
         let votes = self.around.iter().filter_map(|around| {
             let (shows, there) = around.at(self.silhouette.rect, k)?;
             Some(side(shows) * libm::expf(-0.5 * gap(color, &there) / self.mean_gap))
@@ -151,7 +152,7 @@ impl Cut<'_> {
 
     /// Returns the squared difference of the colors of two pixels.
     fn gap(&self, p: usize, q: usize) -> f32 {
-        let rgb = &self.ground.difference.rgb.pixels;
+        let rgb = &self.difference.rgb.pixels;
         gap(&rgb[3 * p..3 * p + 3], &rgb[3 * q..3 * q + 3])
     }
 }

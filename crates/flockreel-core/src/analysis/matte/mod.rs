@@ -12,12 +12,11 @@ mod around;
 mod coat;
 mod cut;
 mod given;
-mod ground;
 mod seen;
 
 pub use self::around::Shape;
 pub use self::coat::Coat;
-use self::ground::{dot, minus};
+use self::coat::{dot, minus};
 pub use self::seen::{Seen, Stored};
 use super::scene::background::Background;
 use super::scene::light::Light;

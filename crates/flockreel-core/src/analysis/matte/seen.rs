@@ -6,7 +6,6 @@
 use super::around::{Around, Shape};
 use super::coat::Coat;
 use super::cut::{Cut, mean_gap};
-use super::ground::Ground;
 use super::{BAND_PX, MARGIN_PX, Matte, View, over_box, painted};
 use crate::analysis::scene::background::Background;
 use crate::analysis::silhouette::{self, Difference};
@@ -41,7 +40,8 @@ impl Seen {
             (view.ignored.iter()).for_each(|ignored| difference.clear(*ignored));
             let silhouette = over_box(silhouette, rect);
             let cut = Cut {
-                ground: Ground::new(&difference, view.background),
+                difference: &difference,
+                background: view.background,
                 coat: view.coat,
                 silhouette: &silhouette,
                 mean_gap: mean_gap(&difference),
@@ -111,7 +111,8 @@ impl Seen {
     /// Cuts the animal out again, with the animal in the frames around; `None` where that changes nothing.
     pub fn pull(&self, background: &Background, coat: &Coat, around: &[Around]) -> Option<Matte> {
         let cut = Cut {
-            ground: Ground::new(&self.difference, background),
+            difference: &self.difference,
+            background,
             coat,
             silhouette: &self.silhouette,
             mean_gap: mean_gap(&self.difference),

@@ -9,7 +9,7 @@ use crate::raster::runs;
 
 /// Parts are thin below this share of the greatest half width. Labelled mice and flies: 0.3 to 0.6 gives the
 /// most accurate body axis. Above 0.3, a slender fish loses its own tail.
-pub const THIN_SHARE: f64 = 0.3;
+const THIN_SHARE: f64 = 0.3;
 
 /// Returns the moments of a silhouette without its thin parts; `None` for an empty silhouette.
 pub(super) fn moments(silhouette: &Mask) -> Option<Moments> {

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 pub mod asymmetry;
-pub mod body;
+mod body;
 mod confidence;
 mod evidence;
 mod identity;

@@ -32,7 +32,7 @@ fn mended(scene: &Scene) -> Seen {
 
 #[test]
 fn frames_around_show_what_one_frame_does_not() {
-    let scene = Scene::with(9, |_, _| PAPER, whole);
+    let scene = Scene::with(|_, _| PAPER, whole);
     let front = [54, 33];
     let Pulled { matte, seen } = scene.cut(bitten);
     let alone = pixel_of(&matte, front)[3];

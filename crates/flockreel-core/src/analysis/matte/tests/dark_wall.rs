@@ -102,17 +102,13 @@ fn animal_in_front_of_a_dark_wall_is_whole() {
 
 /// A body with a shadow, and an image in the wall that is larger than the body.
 fn with_a_large_image(x: u32, y: u32) -> u8 {
-    let cast = Rect {
-        x: BODY.right(),
-        y: 30,
-        w: 6,
-        h: 6,
-    };
+    let is_cast = (BODY.right()..68).contains(&x) && (28..38).contains(&y);
     let is_image = x >= 72 && (18..48).contains(&y);
-    match (steps_away([x, y], BODY), is_image) {
-        (0, _) => FUR,
-        (_, true) => WALL - 12,
-        _ => wall(x, y) - wall(x, y) / 15 * 3u8.saturating_sub(steps_away([x, y], cast) as u8),
+    match (steps_away([x, y], BODY), is_cast, is_image) {
+        (0, ..) => FUR,
+        (_, true, _) => PAPER / 5 * 4,
+        (.., true) => WALL - 12,
+        _ => wall(x, y),
     }
 }
 

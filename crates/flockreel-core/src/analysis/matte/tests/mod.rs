@@ -2,7 +2,6 @@
 
 mod around;
 mod dark_wall;
-mod tail;
 
 use super::*;
 use crate::analysis::Params;
@@ -38,37 +37,29 @@ fn drawn(shade: fn(u32, u32) -> u8) -> Drawn {
 }
 
 fn drawn_on(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Drawn {
-    drawn_above(9, ground, shade)
-}
-
-/// Draws an animal whose silhouette are the pixels that differ from the ground by more than `level`.
-fn drawn_above(level: u8, ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Drawn {
-    let scene = Scene::with(level, ground, shade);
+    let scene = Scene::with(ground, shade);
     let matte = scene.cut(shade).matte;
     Drawn { matte, shade }
 }
 
 /// A scene, and the colors of an animal in it.
 struct Scene {
-    /// The silhouette are the pixels that differ from the ground by more than this.
-    level: u8,
     ground: fn(u32, u32) -> u8,
     background: Background,
     coat: Coat,
 }
 
 impl Scene {
-    fn with(level: u8, ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Scene {
+    fn with(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Scene {
         let [width, height] = SIZE;
         let sigma = vec![1.5; (width * height) as usize];
         let background = Background::new(picture(ground), sigma, Params::default().threshold);
-        let silhouette = silhouette_of(level, ground, shade);
+        let silhouette = silhouette_of(ground, shade);
         let frame = picture(shade);
         let difference =
             silhouette::difference(&frame, &background, &Light::NEUTRAL, silhouette.rect);
         let coat = Coat::learn(&[(difference, &background, silhouette)], true);
         Scene {
-            level,
             ground,
             background,
             coat,
@@ -83,16 +74,16 @@ impl Scene {
             coat: &self.coat,
             ignored: &[],
         };
-        pull(&view, &silhouette_of(self.level, self.ground, shade), 60.0)
+        pull(&view, &silhouette_of(self.ground, shade), 60.0)
     }
 }
 
-fn silhouette_of(level: u8, ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Mask {
+fn silhouette_of(ground: fn(u32, u32) -> u8, shade: fn(u32, u32) -> u8) -> Mask {
     let [width, height] = SIZE;
     let mut silhouette = Mask::new(Rect::of_size(width, height));
     for k in 0..width * height {
         silhouette.bits[k as usize] =
-            u8::from(ground(k % width, k / width).abs_diff(shade(k % width, k / width)) > level);
+            u8::from(ground(k % width, k / width).abs_diff(shade(k % width, k / width)) > 9);
     }
     silhouette.fill_holes();
     silhouette
@@ -251,7 +242,7 @@ fn with_two_shadows(x: u32, y: u32) -> u8 {
 
 #[test]
 fn shadow_on_brighter_floor_is_removed() {
-    let drawn = drawn_above(45, lit_from_the_right, with_two_shadows);
+    let drawn = drawn_on(lit_from_the_right, with_two_shadows);
     for x in 67..103 {
         assert_eq!(drawn.pixel(x, 32)[3], 255, "the tail at {x}");
         for y in (22..26).chain(40..44) {
