@@ -1,5 +1,5 @@
-//! What each flock of a data set shows. Every random number has a key of its own, so a flock does not depend on
-//! the others.
+//! Plan of a data set: the footage, the parameters and the look of each flock. A flock depends on the seed and on
+//! its number only, so the flocks before it may change.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -71,7 +71,7 @@ pub enum Ground {
     Picture(usize),
 }
 
-/// What a random number of a flock decides: the second word of its key.
+/// Value of a flock that is drawn at random. Each has random numbers of its own.
 #[derive(Clone, Copy)]
 enum Choice {
     Split,
@@ -305,6 +305,29 @@ mod tests {
             |one: &Sequence| matches!(one.params.render.background, Background::Color(_));
         let n_colors = of(&is_color);
         assert!((20..60).contains(&n_colors), "{n_colors}");
+    }
+
+    #[test]
+    fn values_of_a_flock_are_independent() {
+        let params = params(400);
+        let plan = plan(&params);
+        let shares = |of: &dyn Fn(&Sequence) -> f64, [low, high]: [f64; 2]| -> Vec<f64> {
+            let share = |one| (of(one) - low) / (high - low) - 0.5;
+            plan.sequences.iter().map(share).collect()
+        };
+        let all = [
+            shares(&|one| one.look.noise, params.noise),
+            shares(&|one| one.look.blur_px, params.blur_px),
+            shares(&|one| one.params.render.haze_per_bl, params.haze_per_bl),
+            shares(&|one| one.params.render.shadow.unwrap_or(9.0), [0.1, 0.3]),
+        ];
+        for (a, first) in all.iter().enumerate() {
+            for second in &all[a + 1..] {
+                let products = first.iter().zip(second).map(|(a, b)| 12.0 * a * b);
+                let correlation = products.sum::<f64>() / first.len() as f64;
+                assert!(correlation.abs() < 0.25, "{correlation}");
+            }
+        }
     }
 
     #[test]

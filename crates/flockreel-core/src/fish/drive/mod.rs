@@ -10,8 +10,7 @@
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::error::Error;
-use super::figure::Figure;
-use super::figure::{Fit, Midline};
+use super::figure::{Figure, Fit, Midline};
 use super::motion::{Motion, Posture, bank_rad, nearest_sign, rotation_of, slerp};
 use super::params::Params;
 use super::spine::{

@@ -120,9 +120,9 @@ fn changed(fit: &Fit, value: usize, step: f64) -> Fit {
     match value {
         0 | 1 => moved.center_px[value] += step * fit.length_px,
         2 => moved.yaw_rad = (fit.yaw_rad + step).clamp(-PI, 0.0),
-        5 => moved.bend_bl += step,
         3 => moved.pitch_rad = (fit.pitch_rad + step).clamp(-FRAC_PI_2, FRAC_PI_2),
-        _ => moved.length_px *= libm::exp(step),
+        4 => moved.length_px *= libm::exp(step),
+        _ => moved.bend_bl += step,
     }
     moved
 }

@@ -20,7 +20,7 @@ use self::grid::{Grid, Sheet};
 pub(super) use self::pixels::Pixels;
 use super::error::Error;
 use crate::library::{Library, Pose, View};
-use crate::order::median;
+use crate::order::{median, percentile};
 use crate::raster::RgbaImage;
 
 /// Flat picture of an animal, and its place in every frame.
@@ -213,8 +213,7 @@ fn good_frames(library: &Library) -> Vec<usize> {
     if poses.view == View::Side {
         let length = |k: &usize| poses.frames[*k].length_px.unwrap_or(0.0);
         let mut lengths: Vec<f64> = frames.iter().map(length).collect();
-        lengths.sort_by(f64::total_cmp);
-        let long = lengths.get(lengths.len() * 9 / 10).copied().unwrap_or(0.0);
+        let long = percentile(&mut lengths, 0.9).unwrap_or(0.0);
         frames.retain(|k| length(k) >= 0.9 * long);
     }
     let n = frames.len();
