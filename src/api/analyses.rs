@@ -1,6 +1,7 @@
-//! POST /v1/analyses: queues a job that measures a footage and makes a library.
+//! POST /v1/analyses: queues a job that measures a footage and makes a library. The request names stored footage, or its
+//! body is the video itself, which is then stored first.
 //!
-//! The request names stored footage, or its body is the video itself, which is then stored first.
+//! POST /v1/analyses/preview: what such a job would find in some frames, while the client waits.
 
 use axum::extract::{FromRequest, Request};
 use serde::{Deserialize, Serialize};
@@ -10,13 +11,14 @@ use utoipa::ToSchema;
 use super::extract::{Access, Json, Query};
 use super::footage::{Naming, admit};
 use super::jobs::accepted;
-use super::problem::{Answer, Problem, ProblemBody};
+use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::receive::{Form, is_film, receive_with_json};
 use super::resources::Reference;
 use crate::jobs::IdSequence;
-use crate::jobs::analysis::Input;
+use crate::jobs::analysis::{Input, preview};
 use crate::store::footage::{Added, Footage};
 use flockreel_core::analysis::Params;
+use flockreel_core::analysis::scene::preview::SeenFrame;
 use flockreel_core::code::Code;
 use flockreel_core::formats::params;
 use flockreel_core::ids::{FootageId, JobId, LibraryId};
@@ -135,16 +137,8 @@ pub(super) async fn create_analysis(
         }
     } else {
         let Json(request) = Json::<AnalysisRequest>::from_request(request, &access.state).await?;
-        let params: Params = params::read(request.params)?;
-        let footage_id = access.id_of::<Footage>(request.footage_id).await?;
-        let footage_id = FootageId(footage_id);
-        let owners = &access.caller.owners;
-        let footage = access.store().resource::<Footage>(footage_id.0, owners);
-        let Some(footage) = footage.await? else {
-            let sentence = format!("the footage does not exist: {footage_id}");
-            return Err(Problem::new(Code::InvalidParams, sentence));
-        };
-        access.note_use::<Footage>(&footage);
+        let params = params::read(request.params)?;
+        let footage_id = FootageId(named_footage(&access, request.footage_id).await?.id);
         Input { footage_id, params }
     };
     let (job_id, library_id) = access.enqueue(&input, None, &mut ids).await?;
@@ -158,4 +152,58 @@ pub(super) async fn create_analysis(
         &format!("/v1/libraries/{library_id}"),
         body,
     ))
+}
+
+/// What an analysis would find.
+#[derive(Serialize, ToSchema)]
+pub(super) struct AnalysisPreview {
+    /// At most 64 frames, spread evenly over the measured part of the film. Empty if the reason for a refusal hides the
+    /// animal, such as a camera that moves.
+    frames: Vec<SeenFrame>,
+    /// Reason for which the analysis would refuse the film; null if there is none.
+    refusal: Option<ProblemBody>,
+}
+
+/// Preview an analysis.
+///
+/// Finds the animal in at most 64 frames while the client waits, and tells whether an analysis with these parameters
+/// would refuse the film. Nothing is stored. A film larger than 640 pixels is reduced first, so very small animals can be
+/// missed, and only the analysis itself sees every frame: its result can differ.
+///
+/// The footage must exist. One preview of an owner runs at a time. A preview that cannot start within 20 seconds fails
+/// with `busy`, and one of more than 30 seconds with `time_limit`. It ends when the client closes the connection.
+#[utoipa::path(post, path = "/v1/analyses/preview", request_body = AnalysisRequest, responses(
+    (status = 200, body = AnalysisPreview),
+    (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
+    (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
+))]
+pub(super) async fn preview_analysis(
+    access: Access,
+    Json(request): Json<AnalysisRequest>,
+) -> JsonAnswer<AnalysisPreview> {
+    let params: Params = params::read(request.params)?;
+    let footage = named_footage(&access, request.footage_id).await?;
+    let (context, owner) = (&access.state.context, &access.caller.account.owner);
+    let preview = preview::preview(context, owner, &footage, params).await?;
+    Ok(axum::Json(AnalysisPreview {
+        frames: preview.frames,
+        refusal: preview.refusal.map(|refusal| {
+            let problem = Problem::new(refusal.code(), refusal.sentence);
+            ProblemBody::new(&problem, refusal.mends)
+        }),
+    }))
+}
+
+/// Finds the footage that a request names, and notes its use.
+async fn named_footage(access: &Access, reference: Reference) -> Result<Footage, Problem> {
+    let id = access.id_of::<Footage>(reference).await?;
+    let footage = access
+        .store()
+        .resource::<Footage>(id, &access.caller.owners);
+    let Some(footage) = footage.await? else {
+        let sentence = format!("the footage does not exist: {id}");
+        return Err(Problem::new(Code::InvalidParams, sentence));
+    };
+    access.note_use::<Footage>(&footage);
+    Ok(footage)
 }

@@ -209,6 +209,7 @@ fn table() -> OpenApiRouter<AppState> {
             uploads::delete_upload
         ))
         .routes(routes!(analyses::create_analysis))
+        .routes(routes!(analyses::preview_analysis))
         .routes(routes!(libraries::list_libraries))
         .routes(routes!(
             libraries::get_library,

@@ -58,6 +58,22 @@ pub(super) struct ProblemBody {
     mends: Vec<Mend>,
 }
 
+impl ProblemBody {
+    /// Returns the body for a problem that `mends` may mend.
+    pub(super) fn new(problem: &Problem, mends: Vec<Mend>) -> ProblemBody {
+        let code = problem.code;
+        ProblemBody {
+            type_url: format!("/docs/errors#{code}"),
+            title: code.meaning(),
+            status: problem.status().as_u16(),
+            detail: problem.detail.clone(),
+            code: code.name(),
+            advice: code.advice(),
+            mends,
+        }
+    }
+}
+
 impl Problem {
     /// Returns a problem with a description of its own.
     pub fn new(code: Code, detail: impl Into<String>) -> Problem {
@@ -150,15 +166,7 @@ impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let status = self.status();
         let is_transient = self.is_transient();
-        let body = ProblemBody {
-            type_url: format!("/docs/errors#{}", self.code),
-            title: self.code.meaning(),
-            status: status.as_u16(),
-            detail: self.detail,
-            code: self.code.name(),
-            advice: self.code.advice(),
-            mends: Mend::all_for(self.code),
-        };
+        let body = ProblemBody::new(&self, Mend::all_for(self.code));
         let mut response = (status, axum::Json(body)).into_response();
         let headers = response.headers_mut();
         let media_type = HeaderValue::from_static("application/problem+json");

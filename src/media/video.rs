@@ -39,6 +39,15 @@ impl Video {
         }))
     }
 
+    /// Reduces the frames of a film to a longest side of at most `longest_px`, and returns their size as a share of the
+    /// film's. Pictures keep their size.
+    pub fn reduce(&mut self, longest_px: u32) -> f64 {
+        match &mut self.0 {
+            Kind::Film(film) => film.reduce(longest_px),
+            Kind::Pictures(_) => 1.0,
+        }
+    }
+
     /// Returns whether the footage has an alpha channel, even if it is opaque throughout.
     pub fn has_alpha(&self) -> bool {
         match &self.0 {

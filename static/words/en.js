@@ -202,6 +202,7 @@ export default {
   "editor.tools": "Tools", "editor.tool.animal": "Animal", "editor.tool.head": "Head", "editor.tool.ignore": "Ignore",
   "editor.tool.animal.help": "Click on the animal. The measurement follows it, whatever else moves.", "editor.tool.head.help": "Click on the head of the animal, so that head and tail are not confused.",
   "editor.tool.ignore.help": "Drag over regions in which nothing is the animal: a clock, a plant, a reflection.", "editor.still": "This browser cannot play the film, so it shows one picture of it.",
+  "editor.seen": "This finds the animal in {found} of {of} frames that were looked at.", "editor.seen.looking": "Looking at the film.", "editor.seen.none": "There is no preview: {reason}",
   "editor.moment": "{time}, frame {frame}", "editor.part": "Part of the film", "editor.part.whole": "the whole film", "editor.part.of": "{from} to {to}",
   "editor.more": "More", "editor.preset": "Preset", "editor.preset.none": "none", "editor.preset.papers": "as in the papers", "editor.preset.help": "The papers' own method, to reproduce their results.",
   "editor.background": "Picture of the empty scene", "editor.background.help": "A picture without the animal, as large as the film.", "editor.masks": "Masks of the animal", "editor.masks.help": "One picture for each frame, as a zip or a film: the animal white, the rest black.",

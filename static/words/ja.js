@@ -201,6 +201,7 @@ export default {
   "editor.tools": "指定するもの", "editor.tool.animal": "動物", "editor.tool.head": "頭", "editor.tool.ignore": "無視",
   "editor.tool.animal.help": "動物をクリックしてください。ほかに動くものがあっても、この動物を追跡します。", "editor.tool.head.help": "動物の頭をクリックしてください。頭と尾を区別できるようになります。",
   "editor.tool.ignore.help": "時計、水草、反射など、動物ではないものの領域をドラッグで囲んでください。", "editor.still": "このブラウザーではこの動画を再生できないため、1枚の画像を表示しています。",
+  "editor.seen": "確認した{of}フレームのうち{found}フレームで動物が見つかります。", "editor.seen.looking": "動画を確認しています。", "editor.seen.none": "プレビューはありません（{reason}）。",
   "editor.moment": "{time}、フレーム{frame}", "editor.part": "計測する区間", "editor.part.whole": "動画全体", "editor.part.of": "{from}から{to}まで",
   "editor.more": "詳細設定", "editor.preset": "プリセット", "editor.preset.none": "なし", "editor.preset.papers": "論文の手法", "editor.preset.help": "論文の結果を再現するための、論文どおりの手法です。",
   "editor.background": "動物のいない背景画像", "editor.background.help": "動物が写っていない、動画と同じ大きさの画像です。", "editor.masks": "動物のマスク", "editor.masks.help": "フレームごとに1枚の画像を、圧縮ファイルか動画にまとめたものです。動物は白、ほかは黒にします。",

@@ -65,6 +65,7 @@ class Walk:
         analysis = self.call("POST /v1/analyses", body={"video": self.film, "params": "{}"}, media_type=FORM).json()
         library = analysis["library_id"]
         self.wait_for(analysis["job_id"])
+        self.call("POST /v1/analyses/preview", body={"footage_id": footage})
         asked = {"library_id": library, "count": 2, "frames": 10}
         self.call("POST /v1/flocks/preview", body=asked)
         flock = self.call("POST /v1/flocks", body=asked).json()

@@ -1,4 +1,4 @@
-//! The process of an attempt, or of a check of received files: reads its order, computes, and reports the end. It stops
+//! The process of an attempt, of a check of received files, or of a preview: reads its order, computes, and reports the end. It stops
 //! when its stdin ends, and its parent kills it if it does not.
 
 use std::io::{self, BufRead, BufReader, Read};
@@ -10,8 +10,9 @@ use rustix::process::{
     Resource, Rlimit, getpriority_process, getrlimit, setpriority_process, setrlimit,
 };
 
-use super::message::{End, Job, Message, Order};
+use super::message::{End, Job, Message, Order, Task};
 use super::{Attempt, Reporter};
+use crate::jobs::analysis::preview;
 use crate::jobs::{self, Error, admit, refusal};
 use crate::media;
 use crate::store::blobs::seal_folder;
@@ -39,8 +40,8 @@ pub fn run(folder: &Path) -> io::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(order.threads);
     let pool = pool.build().map_err(io::Error::other)?;
     let result = survive(|| {
-        pool.install(|| match &order.job {
-            Some(job) => span_of(job).in_scope(|| {
+        pool.install(|| match &order.task {
+            Task::Attempt(job) => span_of(job).in_scope(|| {
                 compute(&Attempt {
                     reporter: &reporter,
                     folder,
@@ -48,7 +49,10 @@ pub fn run(folder: &Path) -> io::Result<()> {
                     job,
                 })
             }),
-            None => admit::inspect(folder).map(End::Inspected),
+            Task::Inspection => admit::inspect(folder).map(End::Inspected),
+            Task::Preview(params) => {
+                preview::compute(&order.subject, params, &*reporter).map(End::Previewed)
+            }
         })
     });
     reporter.send(&Message::End(result.unwrap_or_else(|error| {

@@ -6,18 +6,20 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::jobs::Error;
+use crate::jobs::analysis::preview::Preview;
 use crate::jobs::refusal::mend::Mend;
 use crate::media::FoundTools;
 use crate::store::BlobFile;
+use flockreel_core::analysis::Params;
 use flockreel_core::formats::library_json::FootageSummary;
 use flockreel_core::ids::JobId;
 
 /// Everything that the child needs, except the folder for its files, which is its argument.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Order {
-    /// The job; `None` to check received files, which are in the folder of the child.
-    pub(super) job: Option<Job>,
-    /// Folder with the files of the footage or library that a job works on; empty for a sample.
+    /// What to do.
+    pub(super) task: Task,
+    /// Folder with the files of the footage or library that the task works on; empty for a sample.
     pub(super) subject: PathBuf,
     /// Folder with the files of the footage from which the library of a views job was made; else empty.
     pub(super) film: PathBuf,
@@ -27,6 +29,18 @@ pub(super) struct Order {
     pub(super) memory_bytes: u64,
     /// The media tools.
     pub(super) tools: FoundTools,
+}
+
+/// What a child does.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Task {
+    /// An attempt at a job.
+    Attempt(Job),
+    /// A check of received files, which are in the folder of the child.
+    Inspection,
+    /// A preview of an analysis.
+    Preview(Box<Params>),
 }
 
 /// The job of an attempt.
@@ -66,6 +80,8 @@ pub(super) enum End {
     Done(Product, Vec<File>),
     /// The received files are a film of this format.
     Inspected(Film),
+    /// The analysis would find this.
+    Previewed(Preview),
     /// There is no result.
     Failed(Failure),
 }

@@ -7,7 +7,7 @@
 
 mod child; // the child: computes and reports
 mod decoding; // metrics of decoding
-mod inspection; // check of received files
+mod inspection; // check of received files, and preview of an analysis
 mod message; // what worker and child tell each other
 mod process; // the worker's side: starts the child and follows it
 mod reporter; // progress and cancellation of the child
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 pub use child::run;
 pub(super) use decoding::Counted;
-pub(super) use inspection::{CHECK_TIME, inspect};
+pub(super) use inspection::{CHECK_TIME, inspect, preview};
 pub use message::{Film, Product};
 pub(super) use process::compute;
 pub use reporter::Reporter;

@@ -17,7 +17,7 @@ use tokio_util::task::AbortOnDropHandle;
 use tracing::Instrument;
 use uuid::Uuid;
 
-use super::message::{End, Failure, File, Job, Message, Order};
+use super::message::{End, Failure, File, Job, Message, Order, Task};
 use super::{Film, Product};
 use crate::jobs::error::FailedAttempt;
 use crate::jobs::sample::FILM_NAME;
@@ -128,6 +128,16 @@ async fn fetch_subject(context: &Context, lease: &Lease) -> Result<SubjectFiles,
     })
 }
 
+impl SubjectFiles {
+    /// Returns files that belong to no job.
+    pub(super) fn of(files: Fetched) -> SubjectFiles {
+        SubjectFiles {
+            files: Some(files),
+            ..SubjectFiles::default()
+        }
+    }
+}
+
 async fn row<R: Resource>(context: &Context, id: Uuid) -> Result<R::Row, Error> {
     let row = context.store.resource::<R>(id, &OwnerFilter::All).await?;
     row.ok_or(Error::InputAbsent(id))
@@ -149,7 +159,7 @@ async fn compute_in(
         input: lease.input.clone(),
         footage: subject.footage.clone(),
     };
-    match run_child(context, Some(job), subject, draft, listener).await? {
+    match run_child(context, Task::Attempt(job), subject, draft, listener).await? {
         End::Done(product, files) => Ok((product, files)),
         _ => Err(io::Error::other("an attempt has no result").into()),
     }
@@ -158,14 +168,14 @@ async fn compute_in(
 /// Runs the child in the folder of the draft, and returns how it ended. Fails with the error that it reports.
 pub(super) async fn run_child(
     context: &Context,
-    job: Option<Job>,
+    task: Task,
     subject: &SubjectFiles,
     draft: &Draft,
     listener: &Listener,
 ) -> Result<End, Error> {
     let tools = spawn_blocking(media::found_tools).await;
     let order = Order {
-        job,
+        task,
         subject: path(&subject.files),
         film: path(&subject.film),
         threads: context.threads,

@@ -8,9 +8,10 @@ use crate::media::probe::Probe;
 use crate::media::probe::header::{Orientation, is_rgb};
 use flockreel_core::raster::{Matrix, Range};
 
-/// Returns the filter chain of a film in ffmpeg's syntax.
+/// Returns the filter chain of a film in ffmpeg's syntax. The frames have the given width and height, square pixels.
 pub(super) fn filters(
     probe: &Probe,
+    [width, height]: [u32; 2],
     gray_range: Option<&GrayRange>,
     selection: &FrameSelection,
 ) -> String {
@@ -32,10 +33,7 @@ pub(super) fn filters(
     let orientation = orientation_filters(probe.orientation);
     filters.extend(orientation.into_iter().map(str::to_owned));
     // Bit-exact scaling gives the same bytes on every processor.
-    let mut scale = format!(
-        "scale={}:{}:flags=bicubic+accurate_rnd+bitexact",
-        probe.width, probe.height
-    );
+    let mut scale = format!("scale={width}:{height}:flags=bicubic+accurate_rnd+bitexact");
     if is_rgb(&probe.pix_fmt) && !probe.alpha_as_gray {
         scale += ":out_range=tv:out_color_matrix=bt601"
     } else {

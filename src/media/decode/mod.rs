@@ -44,6 +44,9 @@ pub(super) struct Film {
     limits: Limits,
     probe: Probe,
     gray_range: Option<GrayRange>,
+    /// Width and height of the frames, square pixels.
+    size_px: [u32; 2],
+    is_reduced: bool,
 }
 
 impl Film {
@@ -55,8 +58,11 @@ impl Film {
         limits: &Limits,
         options: &ReadOptions,
     ) -> Result<Film, Error> {
+        let probe = probe(&path, limits, options)?;
         let mut film = Film {
-            probe: probe(&path, limits, options)?,
+            size_px: [probe.width, probe.height],
+            is_reduced: false,
+            probe,
             limits: limits.clone(),
             path,
             gray_range: None,
@@ -67,6 +73,19 @@ impl Film {
             film.gray_range = Some(gray_range);
         }
         Ok(film)
+    }
+
+    /// Reduces the frames to a longest side of at most `longest_px`. Returns their size as a share of the film's.
+    pub(super) fn reduce(&mut self, longest_px: u32) -> f64 {
+        let Probe { width, height, .. } = self.probe;
+        let scale = f64::from(longest_px) / f64::from(width.max(height));
+        if scale >= 1.0 {
+            return 1.0;
+        }
+        let reduced = |side: u32| ((f64::from(side) * scale).round() as u32).max(1);
+        self.size_px = [reduced(width), reduced(height)];
+        self.is_reduced = true;
+        scale
     }
 
     /// Returns notices about the file: assumptions, and corrected faults.
@@ -158,9 +177,10 @@ impl Film {
 impl FrameSource for Film {
     fn format(&self) -> FootageFormat {
         let probe = &self.probe;
+        let [width, height] = self.size_px;
         FootageFormat {
-            width: probe.width,
-            height: probe.height,
+            width,
+            height,
             fps: probe.timeline.fps(),
             n_frames_hint: probe.timeline.n_frames(probe.n_pictures),
             color: probe.color,
@@ -180,7 +200,9 @@ impl FrameSource for Film {
             return spread_by_reading(self, n, visit);
         }
         let format = self.format();
-        if n_pictures >= MIN_FRAMES_PER_PART * n && self.probe.has_plain_times {
+        // Reduced frames are compared with frames of the film, so they must be the right ones.
+        let may_be_late = !self.is_reduced && self.probe.has_plain_times;
+        if n_pictures >= MIN_FRAMES_PER_PART * n && may_be_late {
             let parts_per_s = n as f64 * format.fps / format.n_frames_hint as f64;
             let selection = FrameSelection::OnePerPart {
                 parts_per_s,
@@ -226,7 +248,8 @@ impl FrameStream for FilmStream<'_> {
 
 impl<'a> FilmStream<'a> {
     fn start(film: &'a Film, selection: &FrameSelection) -> Result<FilmStream<'a>, Error> {
-        let filters = filters::filters(&film.probe, film.gray_range.as_ref(), selection);
+        let gray_range = film.gray_range.as_ref();
+        let filters = filters::filters(&film.probe, film.size_px, gray_range, selection);
         Ok(FilmStream {
             film,
             child: Some(film.start_decoder(selection, &filters)?),
@@ -246,11 +269,10 @@ impl<'a> FilmStream<'a> {
 
     /// Reads the bytes of one frame. Returns fewer bytes if the child closed its output.
     fn read(&mut self, frame: &mut Frame) -> Result<usize, Error> {
-        let probe = &self.film.probe;
-        (frame.width, frame.height, frame.color) = (probe.width, probe.height, probe.color);
-        frame
-            .planes
-            .resize(Frame::n_bytes(probe.width, probe.height), 0);
+        [frame.width, frame.height] = self.film.size_px;
+        frame.color = self.film.probe.color;
+        let n_bytes = Frame::n_bytes(frame.width, frame.height);
+        frame.planes.resize(n_bytes, 0);
         match &mut self.child {
             Some(child) => child.read_full(&mut frame.planes),
             None => Ok(0),

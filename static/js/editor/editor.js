@@ -15,6 +15,8 @@ import { settingsForm } from "./form.js";
 import { marksList } from "./marks.js";
 import { partField, partOf } from "./part.js";
 import { createPicture } from "./picture.js";
+import { createPreview } from "./preview.js";
+import { nearest } from "./seen.js";
 import { changed, changesOf, settingsOf } from "./settings.js";
 
 /**
@@ -52,7 +54,16 @@ export async function openEditor({ film: footage, library, former = {}, patch = 
   const draft = signal(settingsOf({ ...former, ...patch }, fields));
   const tool = signal(TOOL_OF[focus] ?? "animal");
   const files = signal(/** @type {Record<string, File | null>} */ ({}));
-  const picture = createPicture(film, { tool, draft, proposed, life });
+  const open = (/** @type {import("./mends.js").Mend} */ { param, value }) => {
+    if (value !== null) draft.set({ ...draft.value, [param]: value });
+    tool.set(TOOL_OF[param] ?? tool.value);
+    focusOn(dialog, param);
+  };
+  const { node: preview, seen } = createPreview({ footage, film, draft, fields, open, life });
+  // Outlines are known for the frames of the preview only.
+  const goToSeen = () => { if (seen.value?.frames.length) film.goTo(nearest(seen.value, film.moment.value)?.frame ?? 0); };
+  seen.watch(goToSeen, life);
+  const picture = createPicture(film, { tool, draft, seen, proposed, life });
 
   const radios = TOOLS.map((name) => element("label.choice", {}, element("input", { type: "radio", name: "editor-tool", value: name, onchange: () => tool.set(name) }), element("span", {}, say(`editor.tool.${name}`))));
   const help = element("p.soft");
@@ -69,7 +80,7 @@ export async function openEditor({ film: footage, library, former = {}, patch = 
   tool.watch(showTool, life);
   film.isBroken.watch(showTool, life);
   const time = element("output");
-  const axis = element("input", { type: "range", name: "frame", min: 0, max: film.last, step: 1, "aria-label": say("desk.frame"), oninput: () => film.goTo(axis.valueAsNumber) });
+  const axis = element("input", { type: "range", name: "frame", min: 0, max: film.last, step: 1, "aria-label": say("desk.frame"), oninput: () => film.goTo(axis.valueAsNumber), onchange: goToSeen });
   film.moment.watch((now) => { axis.value = String(now); time.textContent = say("editor.moment", { time: seconds(now / footage.fps), frame: String(now) }); }, life);
 
   const form = settingsForm({ fields, draft, life });
@@ -84,7 +95,7 @@ export async function openEditor({ film: footage, library, former = {}, patch = 
     element("header.place-head", {}, element("h2", {}, say("editor.title")), element("button.quiet", { type: "button", onclick: () => dialog.close() }, say("cancel"))),
     element("div.editor-columns", {},
       element("div.editor-left", {}, element("fieldset.choices", {}, element("legend.unseen", {}, say("editor.tools")), ...radios), help, element("div.editor-box", {}, picture), marks,
-        element("label.field", {}, element("span.field-line", {}, say("desk.frame"), time), axis), partField(draft, film, footage.fps)),
+        element("label.field", {}, element("span.field-line", {}, say("desk.frame"), time), axis), preview, partField(draft, film, footage.fps)),
       element("div.editor-right", {}, form.main, fileFields(footage, files), form.more)),
     element("footer.editor-foot", {}, sentence, problem, start));
   const dialog = element("dialog.editor", { "aria-label": say("editor.title") }, body);

@@ -2,6 +2,7 @@
 // @ts-check
 import { say } from "../app/words.js";
 import { drawnCanvas, fitted, loadPicture } from "../desk/canvas.js";
+import { drawSeen, nearest } from "./seen.js";
 
 /** @typedef {"animal" | "head" | "ignore" | "ruler"} Tool */
 /** Shortest side of a box and length of a ruler, pixels of the film. */
@@ -11,10 +12,10 @@ const LEAST_PX = 4;
 
 /**
  * @param {Shown} film
- * @param {{tool: import("../app/store.js").Signal<Tool>, draft?: import("./editor.js").Draft, proposed?: number[][], ruler?: import("../app/store.js").Signal<number[][] | null>, life: AbortSignal}} parts
- *   draft: takes points and boxes; proposed: boxes that the service proposes to ignore; ruler: takes the line
+ * @param {{tool: import("../app/store.js").Signal<Tool>, draft?: import("./editor.js").Draft, seen?: import("./preview.js").Seen, proposed?: number[][], ruler?: import("../app/store.js").Signal<number[][] | null>, life: AbortSignal}} parts
+ *   draft: takes points and boxes; seen: what a measurement would find; proposed: boxes that the service proposes to ignore; ruler: takes the line
  */
-export function createPicture(film, { tool, draft, proposed = [], ruler, life }) {
+export function createPicture(film, { tool, draft, seen, proposed = [], ruler, life }) {
   const { size, video, isBroken } = film;
   /** @type {ImageBitmap | null} */
   let background = null;
@@ -33,6 +34,8 @@ export function createPicture(film, { tool, draft, proposed = [], ruler, life })
     context.scale(zoom, zoom);
     const source = !isBroken.value && video.readyState >= 2 ? video : background;
     if (source) context.drawImage(source, 0, 0, size[0], size[1]);
+    const found = nearest(seen?.value ?? null, film.moment.value);
+    if (found?.frame === film.moment.value) drawSeen(context, found, zoom, colors.water);
     context.lineWidth = 2 / zoom;
     for (const [x, y, w, h] of proposed) {
       context.strokeStyle = "#e8641b";
@@ -87,7 +90,7 @@ export function createPicture(film, { tool, draft, proposed = [], ruler, life })
     ask();
   });
   canvas.addEventListener("blur", () => { isKeyboard = false; ask(); });
-  for (const seen of [draft, ruler, tool, film.moment]) seen?.watch(ask, life);
+  for (const shown of [draft, ruler, tool, seen, film.moment]) shown?.watch(ask, life);
   isBroken.watch((now) => { if (now) void loadPicture(film.picture, life).then((found) => { background = found; ask(); }); }, life);
   for (const event of ["seeked", "loadeddata"]) video.addEventListener(event, ask, { signal: life });
   return canvas;

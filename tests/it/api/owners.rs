@@ -54,6 +54,11 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("GET", "/v1/jobs/{id}/events", Path("jobs")),
         ("POST", "/v1/jobs/{id}/retry", Path("jobs")),
         ("POST", "/v1/analyses", Body("footage_id", "footage")),
+        (
+            "POST",
+            "/v1/analyses/preview",
+            Body("footage_id", "footage"),
+        ),
         ("POST", "/v1/footage/{id}/variants", Path("footage")),
         ("POST", "/v1/flocks", Body("library_id", "libraries")),
         (

@@ -13,13 +13,18 @@ use crate::common::clip::{SWIM, SWIM_FRAMES};
 pub(super) async fn with_library() -> (TestApp, String, String) {
     let app = TestApp::working().await;
     let footage_id = app.upload(&SWIM).await;
-    let made = app
-        .accept("/v1/analyses", json!({"footage_id": footage_id}))
-        .await;
+    let (path, id) = library_of(&app, &footage_id).await;
+    (app, path, id)
+}
+
+/// Measures a footage. Returns the library's path and id.
+async fn library_of(app: &TestApp, footage_id: &str) -> (String, String) {
+    let request = json!({"footage_id": footage_id});
+    let made = app.accept("/v1/analyses", request).await;
     let job = app.ended_job(&made["job_id"]).await;
     assert_eq!(job["state"], "done", "{job}");
     let id = made["library_id"].as_str().unwrap().to_owned();
-    (app, format!("/v1/libraries/{id}"), id)
+    (format!("/v1/libraries/{id}"), id)
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -55,6 +60,42 @@ async fn preview_equals_the_flock_and_stores_nothing() {
         made["flock_id"].as_str().unwrap()
     );
     assert_eq!(app.json(&path).await["individuals"], preview["individuals"]);
+    app.assert_sound().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn preview_of_an_analysis_finds_what_the_analysis_finds_and_stores_nothing() {
+    let app = TestApp::working().await;
+    let footage_id = app.upload(&SWIM).await;
+    let ask = |params: serde_json::Value| {
+        let body = json!({"footage_id": footage_id, "params": params});
+        app.post("/v1/analyses/preview").json(&body).send()
+    };
+    let preview = json_of(ask(json!({})).await.unwrap(), StatusCode::OK).await;
+    assert_eq!(preview["refusal"], json!(null));
+    let (jobs, libraries) = (app.json("/v1/jobs").await, app.json("/v1/libraries").await);
+    assert_eq!([&jobs["items"], &libraries["items"]], [&json!([]); 2]);
+    let (library, _) = library_of(&app, &footage_id).await;
+    let poses = app.json(&format!("{library}/poses.json")).await;
+    let frames = preview["frames"].as_array().unwrap();
+    assert_eq!(frames.len(), 64);
+    for seen in frames {
+        let k = seen["frame"].as_u64().unwrap() as usize;
+        let centroid = &poses["frames"][k]["centroid_px"];
+        let outline = seen["animal_px"].as_array().expect("the fish is found");
+        let [x, y] = [0, 1].map(|axis| {
+            let sum: f64 = outline.iter().map(|p| p[axis].as_f64().unwrap()).sum();
+            sum / outline.len() as f64
+        });
+        let off_px = (x - centroid[0].as_f64().unwrap()).hypot(y - centroid[1].as_f64().unwrap());
+        assert!(off_px < 8.0, "frame {k}: {off_px} px");
+    }
+    let everything = json!({"ignore": [{"box_px": [0, 0, 320, 240]}]});
+    let refused = json_of(ask(everything).await.unwrap(), StatusCode::OK).await;
+    assert_eq!(refused["refusal"]["code"], "nothing_moves");
+    assert_eq!(refused["refusal"]["mends"][0]["param"], "threshold");
+    let unknown = ask(json!({"treshold": 7})).await.unwrap();
+    assert_eq!(code_of(unknown, 422).await, "invalid_params");
     app.assert_sound().await;
 }
 

@@ -96,6 +96,27 @@ fn spread_frames_equal_those_of_a_full_read() {
 }
 
 #[test]
+fn spread_frames_of_a_reduced_film_are_the_right_ones() {
+    let films = Films::new();
+    let film = films.test_picture("128x96", 200, "-c:v libx264 -bf 2 f.mp4");
+    let mut video = open(&film);
+    assert_eq!(video.reduce(64), 0.5);
+    let format = video.format();
+    assert_eq!([format.width, format.height], [64, 48]);
+    let whole = read_all(&video).expect("a good film");
+    let mut spread = Vec::new();
+    let visit = &mut |frame: &Frame| {
+        spread.push(frame.clone());
+        ControlFlow::Continue(())
+    };
+    video.spread(7, visit).expect("a good film");
+    let wanted = spread_idx(whole.len(), 7).into_iter();
+    let wanted: Vec<Frame> = wanted.map(|idx| whole[idx].1.clone()).collect();
+    assert!(spread == wanted);
+    assert_eq!(open(&film).reduce(128), 1.0, "it is small enough");
+}
+
+#[test]
 fn camera_orientations_are_undone() {
     let films = Films::new();
     films.test_picture("128x96", 5, "-c:v libx264 -pix_fmt yuv420p upright.mp4");

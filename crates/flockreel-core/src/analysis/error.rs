@@ -133,14 +133,24 @@ impl Error {
         Some(Evidence { frames, boxes_px })
     }
 
-    /// Returns the error with its frame number counted from the start of the footage. The analyzed part starts
-    /// at frame `first`.
-    pub(super) fn with_frame_offset(mut self, first: usize) -> Error {
+    /// Returns the error in frames and pixels of the footage. The analyzed part starts at frame `first` and was read at
+    /// `scale` times its size.
+    pub(super) fn in_footage(mut self, first: usize, scale: f64) -> Error {
+        let larger = |box_px: &mut Rect| *box_px = box_px.scaled(1.0 / scale);
         match &mut self {
-            Error::NothingAtPoint(at) => at.frame += first as u32,
-            Error::AnimalTooLarge { frame, .. } | Error::SeveralAnimals { frame, .. } => {
-                *frame += first;
+            Error::NothingAtPoint(at) => {
+                at.frame += first as u32;
+                at.at_px = at.at_px.map(|v| v / scale);
             }
+            Error::AnimalTooLarge { frame, box_px, .. } => {
+                *frame += first;
+                larger(box_px);
+            }
+            Error::SeveralAnimals { frame, boxes_px } => {
+                *frame += first;
+                boxes_px.iter_mut().for_each(larger);
+            }
+            Error::BackgroundNotStatic { box_px, .. } => box_px.iter_mut().for_each(larger),
             _ => {}
         }
         self

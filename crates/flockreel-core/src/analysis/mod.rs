@@ -30,6 +30,7 @@ pub use error::{Error, Evidence};
 pub use params::Params;
 use params::{CutSprites, ScaleMode};
 use pose::{midline, sprite};
+use scene::preview::Preview;
 use similarity::transition;
 
 use std::sync::Arc;
@@ -67,11 +68,32 @@ pub fn analyze(
     let first = part.first_frame();
     let params_of_part = params.counted_from(first);
     let mut library = analyze_part(&part, background, &params_of_part, cpu, scratch, progress)
-        .map_err(|error| error.with_frame_offset(first))?;
+        .map_err(|error| error.in_footage(first, 1.0))?;
     if params.from_s.is_some() || params.to_s.is_some() {
         library.place_in_footage(first, source.format().n_frames_hint);
     }
     Ok(library)
+}
+
+/// Returns what an analysis would find in about 64 frames of a footage, and whether it would refuse the footage.
+///
+/// `source` may show the footage at `scale` times its size; the result is in pixels of the footage. This takes a
+/// fraction of the time of [`analyze`] and fails like it. A small picture hides small animals, and only [`analyze`] sees
+/// every frame, so its result can differ.
+pub fn preview(
+    source: &dyn FrameSource,
+    scale: f64,
+    background: Option<&RgbImage>,
+    params: &Params,
+    progress: &dyn Progress,
+) -> Result<Preview, Error> {
+    let part = Part::new(source, params.from_s, params.to_s);
+    let first = part.first_frame();
+    let params = params.counted_from(first).scaled(scale);
+    let preview = scene::preview(&part, background, &params, progress);
+    preview
+        .map(|preview| preview.in_footage(first, scale))
+        .map_err(|error| error.in_footage(first, scale))
 }
 
 /// Analyses a part of a footage. Frames count from the start of the part.

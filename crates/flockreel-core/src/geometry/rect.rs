@@ -65,6 +65,14 @@ impl Rect {
         Rect::clipped(left - m, top - m, right + m, bottom + m, w, h)
     }
 
+    /// Returns the pixels that the rectangle touches in the image enlarged by `scale`.
+    pub fn scaled(&self, scale: f64) -> Rect {
+        let down = |v: u32| (f64::from(v) * scale).floor() as u32;
+        let up = |v: u32| (f64::from(v) * scale).ceil() as u32;
+        let (right, bottom) = (up(self.right()), up(self.bottom()));
+        Rect::from_edges(down(self.x), down(self.y), right, bottom)
+    }
+
     /// Returns the smallest rectangle that contains both. An empty rectangle adds nothing.
     pub fn union(&self, other: &Rect) -> Rect {
         if self.is_empty() {

@@ -7,6 +7,7 @@ pub mod fill;
 pub mod frame;
 pub mod image;
 pub mod mask;
+pub mod outline;
 pub mod pen;
 pub mod resample;
 pub mod resize;

@@ -51,6 +51,21 @@ impl Params {
         params
     }
 
+    /// Returns the parameters for the footage at `scale` times its size, as far as they concern its scene.
+    pub(in crate::analysis) fn scaled(&self, scale: f64) -> Params {
+        let mut params = self.clone();
+        if let Some(at) = &mut params.animal_at {
+            at.at_px = at.at_px.map(|v| v * scale);
+        }
+        for ignore in &mut params.ignore {
+            let [x, y, w, h] = ignore.box_px;
+            let rect =
+                Rect::from_edges(x, y, x.saturating_add(w), y.saturating_add(h)).scaled(scale);
+            ignore.box_px = [rect.x, rect.y, rect.w, rect.h];
+        }
+        params
+    }
+
     /// Returns the boxes to ignore at a time, clipped to an image of the given size.
     pub fn ignored_at(&self, time_s: f64, [width, height]: [u32; 2]) -> Vec<Rect> {
         let holds = |ignore: &&IgnoreParam| {

@@ -25,6 +25,7 @@ pub mod light;
 pub mod mirror;
 mod occupancy;
 mod pixel_statistics;
+pub mod preview;
 mod probes;
 mod refusal;
 mod resting;
@@ -40,6 +41,7 @@ use background::Background;
 use background_estimate::BackgroundEstimate;
 use light::Light;
 use mirror::Mirror;
+use preview::Preview;
 use refusal::SimilarObjects;
 use samples::Samples;
 use survey::Survey;
@@ -182,14 +184,49 @@ pub fn estimate(
     params: &Params,
     progress: &dyn Progress,
 ) -> Result<Scene, Error> {
-    let mut samples = Samples::spread(source, params, progress)?;
+    let (samples, mut estimate, survey) = explore(source, given, params, progress)?;
+    let similar_objects = refusal::check(&survey, &samples, params)?;
+    let occupancy = estimate.occupancy(&samples, &survey);
     if samples.are_masked() {
-        return estimate_masked(&mut samples, given, params);
+        estimate.repaint(&samples, &occupancy, given.is_some());
     }
+    estimate.finish(&samples, &occupancy, &survey, given.is_some());
+    Scene::new(estimate, &samples, similar_objects)
+}
+
+/// Estimates the scene only as far as the samples show what an analysis would find and whether it would refuse the
+/// footage. The arguments and failures are those of [`estimate`].
+pub fn preview(
+    source: &dyn FrameSource,
+    given: Option<&RgbImage>,
+    params: &Params,
+    progress: &dyn Progress,
+) -> Result<Preview, Error> {
+    let (samples, _, survey) = explore(source, given, params, progress)?;
+    Ok(Preview {
+        frames: preview::seen(&samples, &survey),
+        refused: refusal::check(&survey, &samples, params).err(),
+    })
+}
+
+/// Takes samples, makes backgrounds, and finds the animal in the samples.
+fn explore(
+    source: &dyn FrameSource,
+    given: Option<&RgbImage>,
+    params: &Params,
+    progress: &dyn Progress,
+) -> Result<(Samples, BackgroundEstimate, Survey), Error> {
+    let mut samples = Samples::spread(source, params, progress)?;
     let mut estimate = match given {
         Some(image) => BackgroundEstimate::from_image(image, &mut samples, params)?,
+        // Movement, dimming and flicker of the scene matter only where the animal is found by its motion.
+        None if samples.are_masked() => BackgroundEstimate::from_all_samples(&samples, params),
         None => BackgroundEstimate::from_states(&mut samples, params)?,
     };
+    if samples.are_masked() {
+        let survey = Survey::new(&samples, &estimate.of_samples());
+        return Ok((samples, estimate, survey));
+    }
     let (first, mut survey) = estimate.for_first_survey(&samples);
     let mut occupancy = estimate.occupancy_over_time(&first, &samples, &survey);
     if given.is_none() {
@@ -219,10 +256,7 @@ pub fn estimate(
     if given.is_none() {
         survey = uncover_still_parts(&mut estimate, &samples, survey);
     }
-    let similar_objects = refusal::check(&survey, &samples, params)?;
-    let occupancy = estimate.occupancy(&samples, &survey);
-    estimate.finish(&samples, &occupancy, &survey, given.is_some());
-    Scene::new(estimate, &samples, similar_objects)
+    Ok((samples, estimate, survey))
 }
 
 /// Takes parts of the animal that never leave their place out of the backgrounds. Each repair shows more of the
@@ -252,25 +286,6 @@ fn uncover_still_parts(
         }
     }
     survey
-}
-
-/// Estimates the scene of footage with masks of the animal. Movement, dimming and flicker of the scene are no
-/// reason to refuse it.
-fn estimate_masked(
-    samples: &mut Samples,
-    given: Option<&RgbImage>,
-    params: &Params,
-) -> Result<Scene, Error> {
-    let mut estimate = match given {
-        Some(image) => BackgroundEstimate::from_image(image, samples, params)?,
-        None => BackgroundEstimate::from_all_samples(samples, params),
-    };
-    let survey = Survey::new(samples, &estimate.of_samples());
-    let similar_objects = refusal::check(&survey, samples, params)?;
-    let occupancy = estimate.occupancy(samples, &survey);
-    estimate.repaint(samples, &occupancy, given.is_some());
-    estimate.finish(samples, &occupancy, &survey, given.is_some());
-    Scene::new(estimate, samples, similar_objects)
 }
 
 #[cfg(test)]

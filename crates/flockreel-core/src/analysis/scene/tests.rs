@@ -3,11 +3,12 @@
 
 use std::sync::Arc;
 
-use crate::analysis::params::{CutSprites, Follow};
-use crate::analysis::{Error, Params, analyze};
+use crate::analysis::params::{AnimalAtParam, CutSprites, Follow, IgnoreParam};
+use crate::analysis::{Error, Params, analyze, preview};
 use crate::code::Code;
 use crate::cpu::Level;
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
+use crate::geometry::Rect;
 use crate::library::Library;
 use crate::progress::Silent;
 use crate::random;
@@ -352,4 +353,60 @@ fn hard_shadow_on_the_wall_is_no_part_of_the_animal() {
         let off_px = libm::hypot(found[0] - animal[0], found[1] - animal[1]);
         assert!(off_px < 1.5, "frame {k}: {off_px} px");
     }
+}
+
+#[test]
+fn preview_is_in_frames_and_pixels_of_the_film() {
+    // The film has twice the size of the frames that are read.
+    let picture = |k: usize| Picture::with_discs(vec![swimmer(k, 0.0, 10.0), swimmer(k, 3.1, 8.0)]);
+    let film = Film {
+        n_frames: 90,
+        picture,
+    };
+    let mut params = Params {
+        from_s: Some(1.0),
+        ..Params::default()
+    };
+    let refused = preview(&film, 0.5, None, &params, &Silent).unwrap().refused;
+    let Some(Error::SeveralAnimals { frame, boxes_px }) = refused else {
+        panic!("{refused:?}");
+    };
+    for (turn, radius_px) in [(0.0, 10.0), (3.1, 8.0)] {
+        let center = swimmer(frame, turn, radius_px).center_px;
+        let (center, radius_px) = (center.map(|v| 2.0 * v), 2.0 * radius_px);
+        let is_around = |rect: &Rect| {
+            let off = |from: u32, to: u32, v: f64| (f64::from(from + to) / 2.0 - v).abs();
+            off(rect.x, rect.right(), center[0]) < 4.0
+                && off(rect.y, rect.bottom(), center[1]) < 4.0
+                && (f64::from(rect.w) - 2.0 * radius_px).abs() < 8.0
+        };
+        assert!(boxes_px.iter().any(is_around), "{center:?} {boxes_px:?}");
+    }
+    let at_px = swimmer(40, 3.1, 8.0).center_px.map(|v| 2.0 * v);
+    params.animal_at = Some(AnimalAtParam { frame: 40, at_px });
+    let found = preview(&film, 0.5, None, &params, &Silent).unwrap();
+    assert!(found.refused.is_none(), "{:?}", found.refused);
+    assert_eq!(found.frames[0].frame, 30);
+    for seen in &found.frames {
+        let [x, y] = swimmer(seen.frame, 3.1, 8.0).center_px.map(|v| 2.0 * v);
+        let outline = seen.animal_px.as_ref().expect("the animal is found");
+        for [px, py] in outline {
+            let radius_px = libm::hypot(px - x, py - y);
+            assert!(
+                (radius_px - 16.0).abs() < 3.0,
+                "frame {}: {radius_px}",
+                seen.frame
+            );
+        }
+        assert_eq!(seen.others_px.len(), 1, "the other disc");
+    }
+    params.animal_at = None;
+    let everywhere = [0, 0, 2 * WIDTH, 2 * HEIGHT];
+    params.ignore = vec![IgnoreParam {
+        box_px: everywhere,
+        from_s: None,
+        to_s: None,
+    }];
+    let ignored = preview(&film, 0.5, None, &params, &Silent).unwrap();
+    assert!(matches!(ignored.refused, Some(Error::NothingMoves)));
 }

@@ -2,7 +2,7 @@
 //! (docs/explanation/algorithms.md, "Midline and tail beat").
 
 use super::distance;
-use super::outline::N_POINTS;
+use crate::raster::outline::N_POINTS;
 
 /// Distance from a point to each of the two neighbors that its curvature is computed from, outline points.
 const NEIGHBOR_DISTANCE: usize = 4;

@@ -8,7 +8,6 @@
 pub mod tail_beat;
 
 mod ends;
-mod outline;
 mod sections;
 mod walk;
 
@@ -19,7 +18,7 @@ use crate::analysis::track::sighting::Sighting;
 use crate::geometry::wrap_rad;
 use crate::library::{Pose, Poses, View};
 use crate::order::median;
-use crate::raster::RgbaImage;
+use crate::raster::{RgbaImage, outline};
 
 /// Number of points in a midline, including head and tail tip. Free choice.
 pub const N_POINTS: usize = 11;

@@ -2,15 +2,17 @@
 //! "Transitions and playback"). It writes the library folder (docs/reference/formats.md, "library.json") and
 //! the pictures that the web page shows.
 
+pub mod preview; // what a job would find
+
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::attempt::Counted;
-use super::masks::Masks;
-use super::views::poster::Glimpses;
-use super::{Attempt, Error, Extent, JobInput, Product, Stages, Subject, refusal};
+use crate::jobs::attempt::Counted;
+use crate::jobs::masks::Masks;
+use crate::jobs::views::poster::Glimpses;
+use crate::jobs::{Attempt, Error, Extent, JobInput, Product, Stages, Subject, refusal};
 use crate::media::{Encoding, Notice, ReadOptions, Video, read_image, write_picture};
 use crate::store::footage::{BACKGROUND, MASKS, VIDEO};
 use crate::store::jobs::Kind;
@@ -203,7 +205,7 @@ impl Summary {
 
 impl Advice {
     /// Returns a piece of advice in the form stored with results.
-    pub(super) fn new(code: &str, sentence: &impl ToString) -> Advice {
+    pub(in crate::jobs) fn new(code: &str, sentence: &impl ToString) -> Advice {
         Advice {
             code: code.to_owned(),
             sentence: sentence.to_string(),

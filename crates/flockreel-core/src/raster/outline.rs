@@ -1,13 +1,12 @@
-//! Computes the outline of a matte at half alpha: marching squares with interpolation, smoothed by elliptic
+//! Outline of a matte at half alpha: marching squares with interpolation, smoothed by elliptic
 //! Fourier harmonics (Kuhl & Giardina 1982; docs/explanation/algorithms.md, "Midline and tail beat").
 
 use std::f64::consts::TAU;
 
-use super::distance;
 use crate::geometry::Rect;
 
 /// Number of points in a smoothed outline.
-pub(super) const N_POINTS: usize = 128;
+pub const N_POINTS: usize = 128;
 /// Number of harmonics kept.
 const N_HARMONICS: usize = 16;
 /// Alpha level of the outline, between 127 and 128 of 255.
@@ -18,7 +17,7 @@ const LEVEL: f64 = 127.5;
 /// `alpha` holds one value per pixel of `rect`. The points are in pixels of the image that contains `rect`.
 /// They are evenly spaced before smoothing. Returns `None` if no area above one pixel is at least half
 /// opaque.
-pub(super) fn outline(rect: Rect, alpha: &[u8]) -> Option<Vec<[f64; 2]>> {
+pub fn outline(rect: Rect, alpha: &[u8]) -> Option<Vec<[f64; 2]>> {
     let loops = Grid::new(rect, alpha).loops().into_iter();
     let largest = loops
         .map(|points| (enclosed_px2(&points), points))
@@ -138,7 +137,8 @@ impl Grid {
 fn evenly_spaced(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let at = |k: usize| points[k % points.len()];
     let lengths: Vec<f64> = (0..points.len())
-        .map(|k| distance(at(k), at(k + 1)))
+        .map(|k| (at(k), at(k + 1)))
+        .map(|(p, q)| libm::hypot(p[0] - q[0], p[1] - q[1]))
         .collect();
     let step = lengths.iter().sum::<f64>() / N_POINTS as f64;
     let (mut k, mut passed) = (0, 0.0);

@@ -1,0 +1,104 @@
+//! A preview of an analysis: what it would find in some frames of the film, for a person who is choosing its parameters.
+//! A child process reads the film (docs/explanation/promises.md, "Bad input"). Nothing is stored.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::read_options;
+use crate::jobs::masks::Masks;
+use crate::jobs::refusal::mend::Mend;
+use crate::jobs::{Context, Error, attempt};
+use crate::media::{Limits, Video, read_image};
+use crate::store::footage::{BACKGROUND, Footage, MASKS, VIDEO};
+use crate::store::owners::Owner;
+use flockreel_core::analysis::scene::preview::SeenFrame;
+use flockreel_core::analysis::{self, Params};
+use flockreel_core::code::Code;
+use flockreel_core::footage::FrameSource;
+use flockreel_core::progress::Progress;
+
+/// Longest side of the pictures that a preview looks at, pixels. Free choice: half of it hides the flies of a laboratory,
+/// and twice as much takes three times as long.
+const LONGEST_PX: u32 = 640;
+
+/// What an analysis would find in some frames.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Preview {
+    /// The frames, in the order of time.
+    pub frames: Vec<SeenFrame>,
+    /// Reason for which an analysis would refuse the film.
+    pub refusal: Option<Refusal>,
+}
+
+/// Reason for which an analysis would refuse a film.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Refusal {
+    /// Stable code.
+    code: String,
+    /// The reason as a sentence.
+    pub sentence: String,
+    /// Changes of the parameters that may mend it, the most promising first.
+    pub mends: Vec<Mend>,
+}
+
+impl Refusal {
+    /// Returns the stable code.
+    pub fn code(&self) -> Code {
+        Code::from_name(&self.code).unwrap_or(Code::Internal)
+    }
+}
+
+/// Returns the preview of an analysis. Waits for the owner's turn, and fails with [`Error::Busy`] if it does not come in
+/// time. If the future is dropped, the computation ends.
+pub async fn preview(
+    context: &Context,
+    owner: &Owner,
+    footage: &Footage,
+    params: Params,
+) -> Result<Preview, Error> {
+    let _permit = context.upload_checks.acquire(owner).await?;
+    let files = [VIDEO, BACKGROUND, MASKS];
+    let files = context.store.fetch(&footage.folder, &files).await?;
+    attempt::preview(context, files, params).await
+}
+
+/// Computes the preview of an analysis of the film in a folder.
+pub(in crate::jobs) fn compute(
+    folder: &Path,
+    params: &Params,
+    progress: &dyn Progress,
+) -> Result<Preview, Error> {
+    let limits = Limits::default();
+    let options = read_options(params);
+    let given = |name| Some(folder.join(name)).filter(|path| path.exists());
+    let path = folder.join(VIDEO);
+    let mut video = Video::open_with(&path, &limits, &options)?;
+    let format = video.format();
+    let masks = Masks::open(&video, &path, given(MASKS).as_deref(), &limits, &options)?;
+    let background = given(BACKGROUND).map(|path| read_image(&path, &limits));
+    let background = background.transpose()?;
+    let scale = match (&masks, &background) {
+        (None, None) => video.reduce(LONGEST_PX),
+        // Masks and background have the size of the film.
+        _ => 1.0,
+    };
+    let masked = masks.as_ref().map(|masks| masks.over(&video)).transpose()?;
+    let source: &dyn FrameSource = match &masked {
+        Some(masked) => masked,
+        None => &video,
+    };
+    let (frames, refused) =
+        match analysis::preview(source, scale, background.as_ref(), params, progress) {
+            Ok(preview) => (preview.frames, preview.refused),
+            Err(analysis::Error::Cancelled) => return Err(Error::Cancelled),
+            Err(analysis::Error::Source(error)) => return Err(analysis::Error::from(error).into()),
+            Err(refused) => (Vec::new(), Some(refused)),
+        };
+    let refusal = refused.map(|cause| Refusal {
+        code: cause.code().name().to_owned(),
+        sentence: cause.to_string(),
+        mends: Mend::all_of(&cause, params, &format),
+    });
+    Ok(Preview { frames, refusal })
+}
