@@ -157,7 +157,7 @@ pub(super) async fn create_analysis(
 /// What an analysis would find.
 #[derive(Serialize, ToSchema)]
 pub(super) struct AnalysisPreview {
-    /// At most 64 frames, spread evenly over the measured part of the film. Empty if the reason for a refusal hides the
+    /// At most 40 frames, spread evenly over the measured part of the film. Empty if the reason for a refusal hides the
     /// animal, such as a camera that moves.
     frames: Vec<SeenFrame>,
     /// Reason for which the analysis would refuse the film; null if there is none.
@@ -166,9 +166,8 @@ pub(super) struct AnalysisPreview {
 
 /// Preview an analysis.
 ///
-/// Finds the animal in at most 64 frames while the client waits, and tells whether an analysis with these parameters
-/// would refuse the film. Nothing is stored. A film larger than 640 pixels is reduced first, so very small animals can be
-/// missed, and only the analysis itself sees every frame: its result can differ.
+/// Finds the animal in at most 40 frames while the client waits, and tells whether an analysis with these parameters
+/// would refuse the film. Nothing is stored. Only the analysis itself sees every frame at full size: its result can differ.
 ///
 /// The footage must exist. One preview of an owner runs at a time. A preview that cannot start within 20 seconds fails
 /// with `busy`, and one of more than 30 seconds with `time_limit`. It ends when the client closes the connection.

@@ -68,6 +68,28 @@ def test_one_button_and_measure_mend_a_refused_film(page, service, tmp_path, cod
     assert library["detected_share"] > (0.3 if "part" in shown else 0.8)
 
 
+def test_the_editor_shows_what_would_be_found_and_what_would_be_refused(page, service, tmp_path):
+    alert = send(page, service, films.write(tmp_path / "two.mp4", films.several_animals(seed=9)))
+    alert.get_by_role("button", name=say(page, "mend.follow")).click()
+    seen = page.locator(".editor-seen")
+    expect(seen).to_contain_text(say(page, "editor.seen", found=40, of=40), timeout=LONG_MS)
+    expect(seen.get_by_role("alert")).to_have_count(0)
+    moment = int(page.get_by_label(say(page, "desk.frame"), exact=True).input_value())
+    # The outline of the larger animal is drawn over the film, where it is.
+    x, y = films.path(moment)
+    color = "(canvas, [x, y]) => { const zoom = Math.min(canvas.width / %d, canvas.height / %d); const left = (canvas.width - zoom * %d) / 2; return [...canvas.getContext('2d').getImageData(left + zoom * x - 3, (canvas.height - zoom * %d) / 2 + zoom * y - 3, 6, 6).data]; }" % (films.WIDTH, films.HEIGHT, films.WIDTH, films.HEIGHT)
+    picture = page.locator(".editor-picture")
+    colored = lambda at: any(max(px) - min(px) > 40 for px in (lambda data: [data[k:k + 3] for k in range(0, len(data), 4)])(picture.evaluate(color, at)))
+    until(page, lambda: colored([x + 8, y]))
+    assert not colored([x, y])
+    page.get_by_label(say(page, "set.follow"), exact=True).select_option("one")
+    expect(seen.get_by_role("alert")).to_contain_text("several_animals", timeout=LONG_MS)
+    assert not re.search(FLAG, seen.inner_text()), seen.inner_text()
+    seen.get_by_role("button", name=said(page, "mend.animal_at.value")).first.click()
+    expect(seen.get_by_role("alert")).to_have_count(0, timeout=LONG_MS)
+    expect(page.locator(".editor-marks")).to_contain_text("in frame ")
+
+
 def test_a_large_animal_is_measured_with_masks(page, service, tmp_path):
     masks = films.write(tmp_path / "masks.mkv", films.masks_of_the_large_animal())
     alert = send(page, service, films.write(tmp_path / "large.mp4", films.animal_too_large()))
@@ -87,11 +109,11 @@ def test_a_wrong_point_is_followed_by_the_right_one(page, service, tmp_path):
     zoom = box["height"] / films.HEIGHT
     left = (box["width"] - zoom * films.WIDTH) / 2
     picture.click(position={"x": left + 3, "y": 3})
-    expect(page.locator(".editor-marks")).to_contain_text("in frame 0")
+    expect(page.locator(".editor-marks")).to_contain_text("in frame ")
     page.get_by_role("button", name=say(page, "editor.start"), exact=True).click()
     expect(alert).to_contain_text("nothing_at_point", timeout=LONG_MS)
     alert.get_by_role("button", name=say(page, "mend.animal_at")).click()
-    x, y = films.path(0)
+    x, y = films.path(int(page.get_by_label(say(page, "desk.frame"), exact=True).input_value()))
     picture.click(position={"x": left + zoom * x, "y": zoom * y})
     assert measure(page, service)["detected_share"] > 0.8
 

@@ -16,11 +16,13 @@ use flockreel_core::analysis::scene::preview::SeenFrame;
 use flockreel_core::analysis::{self, Params};
 use flockreel_core::code::Code;
 use flockreel_core::footage::FrameSource;
+use flockreel_core::order;
 use flockreel_core::progress::Progress;
 
-/// Longest side of the pictures that a preview looks at, pixels. Free choice: half of it hides the flies of a laboratory,
-/// and twice as much takes three times as long.
-const LONGEST_PX: u32 = 640;
+/// Longest side of the pictures that a preview looks at first, pixels. Free choice: the time grows with its square.
+const LONGEST_PX: u32 = 480;
+/// Length of an animal in these pictures below which the preview looks at the film as it is, pixels. Free choice.
+const LEAST_PX: f64 = 20.0;
 
 /// What an analysis would find in some frames.
 #[derive(Debug, Serialize, Deserialize)]
@@ -78,27 +80,65 @@ pub(in crate::jobs) fn compute(
     let masks = Masks::open(&video, &path, given(MASKS).as_deref(), &limits, &options)?;
     let background = given(BACKGROUND).map(|path| read_image(&path, &limits));
     let background = background.transpose()?;
+    let whole = video.clone();
+    let find = |video: &Video, scale| {
+        let masked = masks.as_ref().map(|masks| masks.over(video)).transpose()?;
+        let source: &dyn FrameSource = match &masked {
+            Some(masked) => masked,
+            None => video,
+        };
+        found(analysis::preview(
+            source,
+            scale,
+            background.as_ref(),
+            params,
+            progress,
+        ))
+    };
+    // Masks and background have the size of the film.
     let scale = match (&masks, &background) {
         (None, None) => video.reduce(LONGEST_PX),
-        // Masks and background have the size of the film.
         _ => 1.0,
     };
-    let masked = masks.as_ref().map(|masks| masks.over(&video)).transpose()?;
-    let source: &dyn FrameSource = match &masked {
-        Some(masked) => masked,
-        None => &video,
-    };
-    let (frames, refused) =
-        match analysis::preview(source, scale, background.as_ref(), params, progress) {
-            Ok(preview) => (preview.frames, preview.refused),
-            Err(analysis::Error::Cancelled) => return Err(Error::Cancelled),
-            Err(analysis::Error::Source(error)) => return Err(analysis::Error::from(error).into()),
-            Err(refused) => (Vec::new(), Some(refused)),
-        };
+    let (mut frames, mut refused) = find(&video, scale)?;
+    if scale < 1.0 && is_lost(&frames, refused.as_ref(), scale) {
+        (frames, refused) = find(&whole, 1.0)?;
+    }
     let refusal = refused.map(|cause| Refusal {
         code: cause.code().name().to_owned(),
         sentence: cause.to_string(),
         mends: Mend::all_of(&cause, params, &format),
     });
     Ok(Preview { frames, refusal })
+}
+
+/// Returns frames and refusal of a preview, and those of one that ended with a refusal. Fails if it ended otherwise.
+fn found(
+    preview: Result<analysis::scene::preview::Preview, analysis::Error>,
+) -> Result<(Vec<SeenFrame>, Option<analysis::Error>), Error> {
+    match preview {
+        Ok(preview) => Ok((preview.frames, preview.refused)),
+        Err(analysis::Error::Cancelled) => Err(Error::Cancelled),
+        Err(error @ analysis::Error::Source(_)) => Err(error.into()),
+        Err(refused) => Ok((Vec::new(), Some(refused))),
+    }
+}
+
+/// Returns whether pictures reduced by `scale` may have lost the animal: it is absent or small.
+fn is_lost(frames: &[SeenFrame], refused: Option<&analysis::Error>, scale: f64) -> bool {
+    let length_px = |outline: &Vec<[f64; 2]>| {
+        let extent = |axis: usize| {
+            let along = || outline.iter().map(|point| point[axis]);
+            along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
+        };
+        scale * extent(0).max(extent(1))
+    };
+    let lengths = frames.iter().filter_map(|seen| seen.animal_px.as_ref());
+    let length_px = order::median(lengths.map(length_px)).unwrap_or(0.0);
+    let is_unseen =
+        |error: &analysis::Error| matches!(error.code(), Code::NothingMoves | Code::NothingAtPoint);
+    match refused {
+        Some(error) => is_unseen(error),
+        None => length_px < LEAST_PX,
+    }
 }

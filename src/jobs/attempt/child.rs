@@ -28,11 +28,15 @@ const OOM_SCORE: &str = "500";
 /// Runs one attempt: reads the order from stdin, leaves files in `folder`, and writes messages to stdout. Fails if
 /// there is no order or no thread.
 pub fn run(folder: &Path) -> io::Result<()> {
-    yield_to_requests();
+    offer_to_be_killed();
     let mut stdin = BufReader::new(io::stdin());
     let mut line = String::new();
     stdin.read_line(&mut line)?;
     let order: Order = serde_json::from_str(&line)?;
+    // A person waits for a preview, as for a request.
+    if !matches!(order.task, Task::Preview(_)) {
+        yield_to_requests();
+    }
     limit_memory(order.memory_bytes)?;
     media::adopt_tools(order.tools.clone());
     let reporter = Arc::new(Reporter::default());
@@ -97,13 +101,17 @@ fn leave_picture(error: &Error, folder: &Path) {
     }
 }
 
-/// Lowers the priority of this process, so that requests are answered first, and makes it the first to be killed
-/// when memory runs out. Failure is ignored: the job then runs as the service does.
+/// Lowers the priority of this process, so that requests are answered first. Failure is ignored: the job then runs as
+/// the service does.
 fn yield_to_requests() {
     let usual = getpriority_process(None).unwrap_or(0);
     if let Err(error) = setpriority_process(None, usual + NICE_INCREMENT) {
         tracing::debug!(%error, "the priority of a job could not be lowered");
     }
+}
+
+/// Makes this process the first to be killed when memory runs out. Failure is ignored.
+fn offer_to_be_killed() {
     if let Err(error) = std::fs::write("/proc/self/oom_score_adj", OOM_SCORE) {
         tracing::debug!(%error, "the job could not be marked for the kernel");
     }

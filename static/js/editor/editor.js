@@ -60,8 +60,12 @@ export async function openEditor({ film: footage, library, former = {}, patch = 
     focusOn(dialog, param);
   };
   const { node: preview, seen } = createPreview({ footage, film, draft, fields, open, life });
-  // Outlines are known for the frames of the preview only.
-  const goToSeen = () => { if (seen.value?.frames.length) film.goTo(nearest(seen.value, film.moment.value)?.frame ?? 0); };
+  // Outlines are known for the frames of the preview only. A frame in which a point was set stays.
+  const goToSeen = () => {
+    const { animal_at, head } = draft.value;
+    if ([animal_at, head].some((point) => point?.frame === film.moment.value)) return;
+    film.goTo(nearest(seen.value, film.moment.value)?.frame ?? film.moment.value);
+  };
   seen.watch(goToSeen, life);
   const picture = createPicture(film, { tool, draft, seen, proposed, life });
 

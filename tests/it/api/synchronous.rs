@@ -78,7 +78,7 @@ async fn preview_of_an_analysis_finds_what_the_analysis_finds_and_stores_nothing
     let (library, _) = library_of(&app, &footage_id).await;
     let poses = app.json(&format!("{library}/poses.json")).await;
     let frames = preview["frames"].as_array().unwrap();
-    assert_eq!(frames.len(), 64);
+    assert_eq!(frames.len(), 40);
     for seen in frames {
         let k = seen["frame"].as_u64().unwrap() as usize;
         let centroid = &poses["frames"][k]["centroid_px"];

@@ -43,7 +43,7 @@ use light::Light;
 use mirror::Mirror;
 use preview::Preview;
 use refusal::SimilarObjects;
-use samples::Samples;
+use samples::{MAX_SAMPLES, Samples};
 use survey::Survey;
 
 /// Largest share of blocks that may differ where a frame shows a background's scene, 0..=1. Free choice.
@@ -51,6 +51,8 @@ const MAX_DIFFERING_SHARE: f64 = 0.5;
 /// Number of times that still parts of the animal are taken out of the backgrounds. Free choice: it bounds the
 /// time.
 const MAX_REPAIRS: usize = 3;
+/// Number of frames of a preview. Free choice: a person waits for it.
+const PREVIEW_SAMPLES: usize = 40;
 /// Least area of the first still part as a share of the animal's; a smaller one changes little. Free choice.
 const MIN_STILL_SHARE: f64 = 0.3;
 
@@ -184,7 +186,7 @@ pub fn estimate(
     params: &Params,
     progress: &dyn Progress,
 ) -> Result<Scene, Error> {
-    let (samples, mut estimate, survey) = explore(source, given, params, progress)?;
+    let (samples, mut estimate, survey) = explore(source, MAX_SAMPLES, given, params, progress)?;
     let similar_objects = refusal::check(&survey, &samples, params)?;
     let occupancy = estimate.occupancy(&samples, &survey);
     if samples.are_masked() {
@@ -202,21 +204,22 @@ pub fn preview(
     params: &Params,
     progress: &dyn Progress,
 ) -> Result<Preview, Error> {
-    let (samples, _, survey) = explore(source, given, params, progress)?;
+    let (samples, _, survey) = explore(source, PREVIEW_SAMPLES, given, params, progress)?;
     Ok(Preview {
         frames: preview::seen(&samples, &survey),
         refused: refusal::check(&survey, &samples, params).err(),
     })
 }
 
-/// Takes samples, makes backgrounds, and finds the animal in the samples.
+/// Takes at most `max_samples` samples, makes backgrounds, and finds the animal in the samples.
 fn explore(
     source: &dyn FrameSource,
+    max_samples: usize,
     given: Option<&RgbImage>,
     params: &Params,
     progress: &dyn Progress,
 ) -> Result<(Samples, BackgroundEstimate, Survey), Error> {
-    let mut samples = Samples::spread(source, params, progress)?;
+    let mut samples = Samples::spread(source, max_samples, params, progress)?;
     let mut estimate = match given {
         Some(image) => BackgroundEstimate::from_image(image, &mut samples, params)?,
         // Movement, dimming and flicker of the scene matter only where the animal is found by its motion.

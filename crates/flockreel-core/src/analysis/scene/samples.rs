@@ -42,17 +42,18 @@ pub(super) struct Samples {
 }
 
 impl Samples {
-    /// Reads the footage once and keeps frames spread evenly over it. The frame that `animal_at` names
+    /// Reads the footage once and keeps at most `max` frames spread evenly over it. The frame that `animal_at` names
     /// replaces the sample nearest to it. Fails if the footage is too short, cannot be read or ends before
     /// that frame, or if `progress` is cancelled.
     pub(super) fn spread(
         source: &dyn FrameSource,
+        max: usize,
         params: &Params,
         progress: &dyn Progress,
     ) -> Result<Samples, Error> {
         let format = source.format();
         let n_bytes = Frame::n_bytes(format.width, format.height);
-        let n_kept = (BUDGET_BYTES / n_bytes).clamp(MIN_FRAMES, MAX_SAMPLES);
+        let n_kept = (BUDGET_BYTES / n_bytes).clamp(MIN_FRAMES, max);
         let mut frames = Vec::with_capacity(n_kept);
         source.spread(n_kept, &mut |frame| {
             frames.push(frame.clone());
