@@ -77,11 +77,19 @@ def test_the_editor_shows_what_would_be_found_and_what_would_be_refused(page, se
     moment = int(page.get_by_label(say(page, "desk.frame"), exact=True).input_value())
     # The outline of the larger animal is drawn over the film, where it is.
     x, y = films.path(moment)
-    color = "(canvas, [x, y]) => { const zoom = Math.min(canvas.width / %d, canvas.height / %d); const left = (canvas.width - zoom * %d) / 2; return [...canvas.getContext('2d').getImageData(left + zoom * x - 3, (canvas.height - zoom * %d) / 2 + zoom * y - 3, 6, 6).data]; }" % (films.WIDTH, films.HEIGHT, films.WIDTH, films.HEIGHT)
-    picture = page.locator(".editor-picture")
-    colored = lambda at: any(max(px) - min(px) > 40 for px in (lambda data: [data[k:k + 3] for k in range(0, len(data), 4)])(picture.evaluate(color, at)))
-    until(page, lambda: colored([x + 8, y]))
-    assert not colored([x, y])
+    def is_colored_near(reach):
+        """Returns whether a color is drawn over the gray film, at most `reach` pixels of the film from the animal."""
+        script = """(canvas, [x, y, reach, width, height]) => {
+            const zoom = Math.min(canvas.width / width, canvas.height / height);
+            const [left, top] = [(canvas.width - zoom * width) / 2, (canvas.height - zoom * height) / 2];
+            const box = [left + zoom * (x - reach), top + zoom * (y - reach), 2 * zoom * reach, 2 * zoom * reach];
+            return [...canvas.getContext("2d").getImageData(...box).data];
+        }"""
+        data = page.locator(".editor-picture").evaluate(script, [x, y, reach, films.WIDTH, films.HEIGHT])
+        return any(max(data[k:k + 3]) - min(data[k:k + 3]) > 40 for k in range(0, len(data), 4))
+
+    until(page, lambda: is_colored_near(14))
+    assert not is_colored_near(4)
     page.get_by_label(say(page, "set.follow"), exact=True).select_option("one")
     expect(seen.get_by_role("alert")).to_contain_text("several_animals", timeout=LONG_MS)
     assert not re.search(FLAG, seen.inner_text()), seen.inner_text()
