@@ -128,3 +128,14 @@ test("the head of a foreshortened animal is not outside of its box", () => {
   for (const heading_rad of [0, Math.PI / 2]) append(columns, { detected: true, centroid_px: [50, 50], box_px: [40, 20, 20, 60], heading_rad, length_px: 60 });
   assert.deepEqual([0, 1].map((k) => headOf(columns, k).map(Math.round)), [[60, 50], [50, 80]]);
 });
+
+test("the heat map shows where the animal was longest", async () => {
+  const { heatOf } = await import("../../static/js/desk/heat.js");
+  const columns = emptyColumns(40, 10);
+  for (let k = 0; k < 40; k++) append(columns, { time_s: k / 10, detected: k !== 3, centroid_px: k === 3 ? null : k < 30 ? [100, 50] : [150, 20] });
+  const { width, height, cell_px, share } = heatOf(columns, [192, 96]);
+  assert.deepEqual([width, height, cell_px], [96, 48, 2]);
+  assert.equal(share.indexOf(1), 25 * width + 50);
+  assert.ok(Math.abs(share[10 * width + 75] - 10 / 29) < 1e-6, "a third of the time");
+  assert.equal(share[0], 0);
+});

@@ -328,3 +328,27 @@ def test_ruler_changes_plot_numbers_and_csv_to_centimetres(page, library):
     expect(title).to_have_text(in_body_lengths)
     expect(distance).to_have_text(said(page, "unit.bl"))
     assert json.loads(fetch(files))["px_per_cm"] is None
+
+
+def test_a_zone_that_is_drawn_is_counted_and_stays_for_the_next_film(page, library):
+    address, files, _ = library
+    open_desk(page, address + "?tab=zones")
+    panel = page.locator("#panel-zones")
+    expect(panel).to_contain_text(say(page, "desk.zone.none"))
+    box = panel.locator("canvas").bounding_box()
+    # The corners are round.
+    page.mouse.move(box["x"] + 9, box["y"] + 9)
+    page.mouse.down()
+    page.mouse.move(box["x"] + box["width"] - 9, box["y"] + box["height"] - 9)
+    page.mouse.up()
+    row = panel.locator("tbody tr")
+    expect(row).to_contain_text("100%")
+    row.locator("input").fill("arena")
+    row.locator("input").press("Tab")
+    expect(panel.get_by_role("link")).to_have_attribute("href", re.compile("zones=arena%3Arect%3A"))
+    header, values = [line.split(",") for line in fetch(f"{address.split('/libraries')[0]}{panel.get_by_role('link').get_attribute('href')}").decode().splitlines()]
+    assert float(values[header.index("arena_share")]) == 1
+    page.reload()
+    expect(row.locator("input")).to_have_value("arena")
+    row.get_by_role("button").click()
+    expect(panel).to_contain_text(say(page, "desk.zone.none"))

@@ -21,7 +21,7 @@ use flockreel_core::formats::flock_overlay::FlockOverlay;
 use flockreel_core::formats::library_dir::{self, StoredLibrary};
 use flockreel_core::formats::overlay::Overlay;
 use flockreel_core::formats::{csv, flock_json, flock_plan, glb, picture, picture_archive, svg};
-use flockreel_core::library::{Library, Scale};
+use flockreel_core::library::{Library, Scale, Zones};
 use flockreel_core::parameters::Parameters;
 use flockreel_core::progress::Silent;
 use flockreel_core::raster::{ColorSpec, Frame, RgbImage};
@@ -148,7 +148,7 @@ fn show(library: &Library) {
         scale: Scale::new(1e-3).ok(),
     };
     film.motion_json();
-    film.summary_json();
+    film.summary_json(&Zones::default());
     svg::pictures(library);
     let atlas = Atlas::new(library);
     atlas.to_json();

@@ -4,8 +4,10 @@
 use axum::body::{Body, Bytes};
 use axum::http::response::Builder;
 use axum::http::{Response, StatusCode, header};
+use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use tokio_util::io::ReaderStream;
+use utoipa::IntoParams;
 
 use super::saved_name;
 use crate::api::download::names::saved_as;
@@ -17,23 +19,35 @@ use crate::jobs::analysis::Summary;
 use crate::jobs::{self, synchronous};
 use crate::store::blobs::hex;
 use crate::store::resources::Library;
+use flockreel_core::code::Code;
 use flockreel_core::formats::csv::motion::{self, Film};
-use flockreel_core::library::Scale;
+use flockreel_core::library::{Scale, Zones};
 
 /// Name of the file with the distances.
 const DISTANCE_ARRAY: &str = "distance.npy";
 
-/// Writes a file from a film and the id of its library.
-type WriteMotion = fn(&str, Film<'_>) -> String;
+/// Writes a file from a film, the id of its library, and zones.
+type WriteMotion = fn(&str, Film<'_>, &Zones) -> String;
+
+/// Query of a request for a summary.
+#[derive(Debug, Default, Deserialize, IntoParams)]
+pub(in crate::api) struct Zoned {
+    /// Of `summary.csv` and `summary.json`: parts of the picture, separated by `;`. Each is `NAME:rect:X,Y,W,H` or
+    /// `NAME:ellipse:X,Y,W,H` in pixels, such as `center:ellipse:80,60,160,120`.
+    #[param(required = false)]
+    zones: Option<String>,
+}
 
 /// Files that depend on the scale of the library: name, media type and writer.
 const MOTION_FILES: [(&str, &str, WriteMotion); 4] = [
-    ("motion.csv", CSV, |_, film| film.motion_csv()),
-    ("motion.json", JSON, |_, film| film.motion_json()),
-    ("summary.csv", CSV, |id, film| {
-        motion::write_summaries(&[(id, film)])
+    ("motion.csv", CSV, |_, film, _| film.motion_csv()),
+    ("motion.json", JSON, |_, film, _| film.motion_json()),
+    ("summary.csv", CSV, |id, film, zones| {
+        motion::write_summaries(&[(id, film)], zones)
     }),
-    ("summary.json", JSON, |_, film| film.summary_json()),
+    ("summary.json", JSON, |_, film, zones| {
+        film.summary_json(zones)
+    }),
 ];
 const CSV: &str = "text/csv; charset=utf-8";
 const JSON: &str = "application/json";
@@ -48,10 +62,11 @@ pub(super) async fn computed(
     access: &Access,
     library: &Library,
     name: &str,
+    zoned: Zoned,
     conditions: &Conditions,
 ) -> Answer {
     match MOTION_FILES.iter().find(|(known, ..)| *known == name) {
-        Some(file) => motion_file(access, library, *file, conditions).await,
+        Some(file) => motion_file(access, library, *file, zoned, conditions).await,
         None => distance_array(access, library, conditions).await,
     }
 }
@@ -74,18 +89,21 @@ async fn motion_file(
     access: &Access,
     library: &Library,
     (name, media_type, write): (&str, &'static str, WriteMotion),
+    zoned: Zoned,
     conditions: &Conditions,
 ) -> Answer {
     let (context, owner) = (&access.state.context, &access.caller.account.owner);
     let (id, scale) = (library.id.to_string(), scale_of(library));
     let length_px = length_px(library)?;
+    let zones = zoned.zones.as_deref().unwrap_or_default().parse::<Zones>();
+    let zones = zones.map_err(|error| Problem::new(Code::InvalidParams, error.to_string()))?;
     let text = synchronous::from_poses(context, owner, library, move |poses| {
         let film = Film {
             poses,
             length_px,
             scale,
         };
-        write(&id, film)
+        write(&id, film, &zones)
     });
     let text = text.await?;
     let etag = format!("\"{}\"", hex(&Sha256::digest(&text)));

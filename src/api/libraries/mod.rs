@@ -11,7 +11,7 @@ use uuid::Uuid;
 
 use super::download::names::{saved_as, stem};
 use super::download::{Download, Files, find as find_file};
-use super::extract::{Access, Conditions, FileOf, Id, Json, given};
+use super::extract::{Access, Conditions, FileOf, Id, Json, Query, given};
 use super::paging::{Filtered, LibraryQuery, Page};
 use super::problem::{Answer, JsonAnswer, Problem, ProblemBody};
 use super::resources::{FileView, ResultView, View};
@@ -20,7 +20,7 @@ use crate::jobs::analysis::Summary;
 use crate::jobs::views::{FILM, OVERLAY};
 use crate::store::jobs::JobState;
 use crate::store::resources::{Library, Property};
-use computed::{computed, is_computed, length_px, scale_of};
+use computed::{Zoned, computed, is_computed, length_px, scale_of};
 use flockreel_core::code::Code;
 use flockreel_core::library::{Scale, ScaleError};
 use views::{ViewsState, folder_of};
@@ -205,7 +205,7 @@ pub(super) async fn delete_library(access: Access, Id(id): Id) -> Result<StatusC
 ///
 /// - `library.json`, `poses.json`, `poses.csv`: the measured data
 /// - `motion.csv`, `motion.json`: place, speed and size in every frame, in centimetres if the library has a scale
-/// - `summary.csv`, `summary.json`: distance, speeds, rest and turns in the film
+/// - `summary.csv`, `summary.json`: distance, speeds, rest and turns in the film, and the use of `zones`
 /// - `background.png`: the scene without the animal
 /// - `occluders.png`: objects in front of the animal, only if any are known (`occluders` in library.json)
 /// - `distance.png`, `candidates.png`: the distances between clips, and the pairs of similar clips
@@ -225,7 +225,7 @@ pub(super) async fn delete_library(access: Access, Id(id): Id) -> Result<StatusC
 /// and sent whole. They fail with `busy` if another computation does not end within 20 seconds, and
 /// `distance.npy` with `too_many_frames` for longer footage. The ETag of motion and summary depends on the scale.
 #[utoipa::path(get, path = "/v1/libraries/{id}/{file}",
-    params(("id" = Uuid, Path), ("file" = String, Path)), responses(
+    params(("id" = Uuid, Path), ("file" = String, Path), Zoned), responses(
     (status = 200, description = "the file"),
     (status = 206, description = "the requested range of the file"),
     (status = 304, description = "not modified"),
@@ -234,12 +234,13 @@ pub(super) async fn delete_library(access: Access, Id(id): Id) -> Result<StatusC
 pub(super) async fn get_library_file(
     access: Access,
     FileOf(id, name): FileOf,
+    Query(zoned): Query<Zoned>,
     conditions: Conditions,
 ) -> Answer {
     if is_computed(&name) {
         let library = access.find::<Library>(id).await?;
         access.note_use::<Library>(&library);
-        return computed(&access, &library, &name, &conditions).await;
+        return computed(&access, &library, &name, zoned, &conditions).await;
     }
     let (name, media_type) = find_file(FILES, &name)?;
     let library = access.find::<Library>(id).await?;

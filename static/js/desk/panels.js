@@ -1,4 +1,4 @@
-// The panels beside the film: jumps, patches, path, trust, size. Each is made when it is first shown.
+// The panels beside the film: jumps, patches, path, zones, trust, size. Each is made when it is first shown.
 // @ts-check
 import { element } from "../app/element.js";
 import { signal } from "../app/store.js";
@@ -12,8 +12,9 @@ import { patchPanel } from "./patches.js";
 import { drawPath, nearestFrame } from "./path.js";
 import { scalePanel } from "./scale.js";
 import { weakest } from "./weakest.js";
+import { zonesPanel } from "./zones.js";
 
-const TABS = ["jumps", "patches", "pose", "trust", "size"];
+const TABS = ["jumps", "patches", "pose", "zones", "trust", "size"];
 
 /** @typedef {import("./player.js").Player} Player @typedef {import("./shots.js").Shoot} Shoot */
 
@@ -28,6 +29,7 @@ export function createPanels(desk, { player, pictures, shoot, tab, remeasure }) 
     jumps: () => element("div.panel-jumps", {}, createMatrix(desk, { player, pictures }), element("details", {}, element("summary", {}, say("desk.jumps.best")), jumpTable(desk, player))),
     patches: () => patchPanel(desk, { player, pictures, chosen }),
     pose: () => pathPanel(desk, player),
+    zones: () => zonesPanel(desk),
     trust: () => trustPanel(desk, { player, shoot, remeasure }),
     size: () => scalePanel(desk, player),
   };

@@ -4,7 +4,7 @@ import { say } from "../app/words.js";
 import { drawnCanvas, fitted, loadPicture } from "../desk/canvas.js";
 import { drawSeen, nearest } from "./seen.js";
 
-/** @typedef {"animal" | "head" | "ignore" | "ruler"} Tool */
+/** @typedef {"animal" | "head" | "ignore" | "ruler" | "zone"} Tool */
 /** Shortest side of a box and length of a ruler, pixels of the film. */
 const LEAST_PX = 4;
 
@@ -12,10 +12,13 @@ const LEAST_PX = 4;
 
 /**
  * @param {Shown} film
- * @param {{tool: import("../app/store.js").Signal<Tool>, draft?: import("./editor.js").Draft, seen?: import("./preview.js").Seen, proposed?: number[][], ruler?: import("../app/store.js").Signal<number[][] | null>, life: AbortSignal}} parts
- *   draft: takes points and boxes; seen: what a measurement would find; proposed: boxes that the service proposes to ignore; ruler: takes the line
+ * @param {{tool: import("../app/store.js").Signal<Tool>, draft?: import("./editor.js").Draft, seen?: import("./preview.js").Seen, proposed?: number[][], ruler?: import("../app/store.js").Signal<number[][] | null>,
+ *   take?: (box_px: number[]) => void, paint?: (context: CanvasRenderingContext2D, zoom: number, colors: Record<string, string>) => void,
+ *   changed?: import("../app/store.js").Signal<number>, life: AbortSignal}} parts
+ *   draft: takes points and boxes; seen: what a measurement would find; proposed: boxes that the service proposes to ignore; ruler: takes the line;
+ *   take: takes the box of a zone; paint: draws over the picture, again when `changed` does
  */
-export function createPicture(film, { tool, draft, seen, proposed = [], ruler, life }) {
+export function createPicture(film, { tool, draft, seen, proposed = [], ruler, take, paint, changed, life }) {
   const { size, video, isBroken } = film;
   /** @type {ImageBitmap | null} */
   let background = null;
@@ -34,6 +37,7 @@ export function createPicture(film, { tool, draft, seen, proposed = [], ruler, l
     context.scale(zoom, zoom);
     const source = !isBroken.value && video.readyState >= 2 ? video : background;
     if (source) context.drawImage(source, 0, 0, size[0], size[1]);
+    paint?.(context, zoom, colors);
     const found = nearest(seen?.value ?? null, film.moment.value);
     if (found?.frame === film.moment.value) drawSeen(context, found, zoom, colors.water);
     context.lineWidth = 2 / zoom;
@@ -42,7 +46,7 @@ export function createPicture(film, { tool, draft, seen, proposed = [], ruler, l
       context.strokeRect(x, y, w, h);
     }
     const ignored = /** @type {{box_px: number[]}[]} */ (draft?.value.ignore ?? []);
-    const frames = [...ignored.map(({ box_px }) => box_px), ...(drawing && tool.value === "ignore" ? [boxOf(drawing)] : [])];
+    const frames = [...ignored.map(({ box_px }) => box_px), ...(drawing && (tool.value === "ignore" || tool.value === "zone") ? [boxOf(drawing)] : [])];
     for (const [x, y, w, h] of frames) {
       context.fillStyle = "rgb(163 22 31 / 0.45)";
       context.fillRect(x, y, w, h);
@@ -69,7 +73,9 @@ export function createPicture(film, { tool, draft, seen, proposed = [], ruler, l
     if (draft && tool.value === "animal") draft.set({ ...draft.value, animal_at: { frame, at_px: to } });
     if (draft && tool.value === "head") draft.set({ ...draft.value, head: { frame, point: to } });
     const box_px = boxOf(drawing);
-    if (draft && tool.value === "ignore" && box_px[2] >= LEAST_PX && box_px[3] >= LEAST_PX) draft.set({ ...draft.value, ignore: [...draft.value.ignore ?? [], { box_px, from_s: null, to_s: null }] });
+    const isBox = box_px[2] >= LEAST_PX && box_px[3] >= LEAST_PX;
+    if (isBox && tool.value === "zone") take?.(box_px);
+    if (draft && isBox && tool.value === "ignore") draft.set({ ...draft.value, ignore: [...draft.value.ignore ?? [], { box_px, from_s: null, to_s: null }] });
     if (tool.value === "ruler" && Math.hypot(to[0] - from[0], to[1] - from[1]) >= LEAST_PX) ruler?.set(drawing);
     drawing = null;
     ask();
@@ -90,7 +96,7 @@ export function createPicture(film, { tool, draft, seen, proposed = [], ruler, l
     ask();
   });
   canvas.addEventListener("blur", () => { isKeyboard = false; ask(); });
-  for (const shown of [draft, ruler, tool, seen, film.moment]) shown?.watch(ask, life);
+  for (const shown of [draft, ruler, tool, seen, changed, film.moment]) shown?.watch(ask, life);
   isBroken.watch((now) => { if (now) void loadPicture(film.picture, life).then((found) => { background = found; ask(); }); }, life);
   for (const event of ["seeked", "loadeddata"]) video.addEventListener(event, ask, { signal: life });
   return canvas;

@@ -78,6 +78,27 @@ async fn scale_changes_centimetres_at_once_and_no_stored_file() {
         column(&row, "distance_cm"),
         [summary["distance_cm"].as_f64().unwrap()]
     );
+    let zones = "all:rect:-1,-1,9999,9999;none:ellipse:-9,-9,1,1";
+    let zoned = app
+        .json(&format!("{library}/summary.json?zones={zones}"))
+        .await;
+    assert_eq!(zoned["all_s"], summary["seen_s"]);
+    assert_eq!(zoned["all_distance_cm"], summary["distance_cm"]);
+    assert_eq!(
+        [&zoned["all_share"], &zoned["all_visits"]],
+        [&json!(1), &json!(1)]
+    );
+    assert_eq!(
+        [&zoned["none_s"], &zoned["none_first_s"]],
+        [&json!(0), &Value::Null]
+    );
+    let (_, row) = file(&app, &format!("{library}/summary.csv?zones={zones}")).await;
+    assert_eq!(column(&row, "all_s"), [summary["seen_s"].as_f64().unwrap()]);
+    let wrong = app.get(&format!("{library}/summary.csv?zones=all:rect:1"));
+    assert_eq!(
+        code_of(wrong.send().await.unwrap(), 422).await,
+        "invalid_params"
+    );
     let frames = app.json(&format!("{library}/motion.json")).await["frames"].clone();
     assert_eq!(frames.as_array().unwrap().len(), text.lines().count() - 1);
 

@@ -9,11 +9,13 @@ pub mod playback;
 pub mod pose;
 pub mod scale;
 pub mod sprites;
+pub mod zones;
 
 pub use playback::{Jump, Patch, Playback, Transition};
 pub use pose::{Animal, BeatSpan, BodyPose, Pose, Poses, RawPose, TailBeat, TailBeatMethod, View};
 pub use scale::{Scale, ScaleError};
 pub use sprites::{Matte, Sprites};
+pub use zones::Zones;
 
 use crate::geometry::Rect;
 use crate::raster::{RgbImage, RgbaImage};

@@ -79,7 +79,8 @@ pub fn summarize_motion(poses: &Poses, length_px: Option<f64>) -> MotionSummary 
         .filter(|(pose, _)| pose.detected())
         .map(|(_, s)| s)
         .sum();
-    let distance_px = path_px(poses, length_px.map_or(0.0, |length| STEP_BL * length));
+    let places = poses.frames.iter().map(|pose| pose.centroid_px);
+    let distance_px = path_px(places, step_px(length_px));
     let mut known: Vec<f64> = speeds.iter().flatten().copied().collect();
     let is_seen = seen_s > 0.0;
     MotionSummary {
@@ -96,23 +97,28 @@ pub fn summarize_motion(poses: &Poses, length_px: Option<f64>) -> MotionSummary 
 }
 
 /// Returns the time until the next frame, seconds, for each frame.
-fn durations_s(poses: &Poses) -> Vec<f64> {
+pub(super) fn durations_s(poses: &Poses) -> Vec<f64> {
     let times = poses.frames.windows(2);
     let gaps = times.map(|pair| (pair[1].time_s - pair[0].time_s).max(0.0));
     let last = (!poses.frames.is_empty()).then_some(1.0 / poses.fps);
     gaps.chain(last).collect()
 }
 
-/// Returns the length of the path in steps of at least `step_px`, pixels.
-fn path_px(poses: &Poses, step_px: f64) -> f64 {
+/// Returns the least step of the path of an animal with this body length, pixels.
+pub fn step_px(length_px: Option<f64>) -> f64 {
+    length_px.map_or(0.0, |length| STEP_BL * length)
+}
+
+/// Returns the length of the path through places in steps of at least `step_px`, pixels. `None` is a gap.
+pub(super) fn path_px(places: impl Iterator<Item = Option<[f64; 2]>>, step_px: f64) -> f64 {
     let (mut sum, mut last) = (0.0, None);
-    for pose in &poses.frames {
-        let step = (last.zip(pose.centroid_px)).map(|(from, to)| distance(from, to));
+    for place in places {
+        let step = (last.zip(place)).map(|(from, to)| distance(from, to));
         match step {
             Some(step) if step < step_px => continue,
             step => sum += step.unwrap_or(0.0),
         }
-        last = pose.centroid_px;
+        last = place;
     }
     sum
 }

@@ -3,8 +3,8 @@
 //! library. Without a scale, values in centimetres are null, or empty cells.
 
 use crate::geometry::rounded;
-use crate::library::motion::{speeds_px_per_s, summarize_motion};
-use crate::library::{Pose, Poses, Scale};
+use crate::library::motion::{speeds_px_per_s, step_px, summarize_motion};
+use crate::library::{Pose, Poses, Scale, Zones};
 
 /// Names and versions of the schemas.
 const MOTION_SCHEMA: &str = "flockreel/motion@1";
@@ -24,11 +24,11 @@ pub struct Film<'a> {
 /// The columns of a table, in order, with the values of one row.
 type Row = Vec<(&'static str, Option<f64>)>;
 
-/// Returns summary.csv: a header, and one row for each film with its name.
-pub fn write_summaries(films: &[(&str, Film<'_>)]) -> String {
+/// Returns summary.csv: a header, and one row for each film with its name. Each zone adds columns.
+pub fn write_summaries(films: &[(&str, Film<'_>)], zones: &Zones) -> String {
     let mut text = String::new();
     for (name, film) in films {
-        let row = film.summary();
+        let row = film.summary(zones);
         if text.is_empty() {
             text = format!("library,{}\n", header(&row));
         }
@@ -41,23 +41,23 @@ impl Film<'_> {
     /// Returns motion.csv: a header, and one row per frame.
     pub fn motion_csv(self) -> String {
         let rows = self.frames();
-        let header = rows.first().map(header).unwrap_or_default();
-        let lines = std::iter::once(header).chain(rows.iter().map(cells));
+        let header = rows.first().map(|row| header(row)).unwrap_or_default();
+        let lines = std::iter::once(header).chain(rows.iter().map(|row| cells(row)));
         lines.collect::<Vec<_>>().join("\n") + "\n"
     }
 
     /// Returns motion.json, one line per frame.
     pub fn motion_json(self) -> String {
-        let rows: Vec<String> = self.frames().iter().map(object).collect();
+        let rows: Vec<String> = self.frames().iter().map(|row| object(row)).collect();
         let fields = [vec![("fps", Some(self.poses.fps))], self.size()].concat();
         let head = json_with_header(MOTION_SCHEMA, &fields);
         let head = head.trim_end_matches('}');
         format!("{head},\"frames\":[\n{}\n]}}\n", rows.join(",\n"))
     }
 
-    /// Returns summary.json.
-    pub fn summary_json(self) -> String {
-        json_with_header(SUMMARY_SCHEMA, &self.summary()) + "\n"
+    /// Returns summary.json. Each zone adds fields.
+    pub fn summary_json(self, zones: &Zones) -> String {
+        json_with_header(SUMMARY_SCHEMA, &self.summary(zones)) + "\n"
     }
 
     fn cm(self, px: Option<f64>) -> Option<f64> {
@@ -101,7 +101,7 @@ impl Film<'_> {
         ]
     }
 
-    fn summary(self) -> Row {
+    fn summary(self, zones: &Zones) -> Vec<(String, Option<f64>)> {
         let motion = summarize_motion(self.poses, self.length_px);
         let distance_px = Some(motion.distance_px);
         let row = vec![
@@ -127,17 +127,39 @@ impl Film<'_> {
                 motion.turns_per_min.map(|turns| rounded(turns, 2)),
             ),
         ];
-        [self.size(), row].concat()
+        let row = self.size().into_iter().chain(row);
+        let row = row.map(|(name, value)| (name.to_owned(), value));
+        row.chain(self.zones(zones, motion.seen_s)).collect()
+    }
+
+    /// Returns how the animal used each zone.
+    fn zones(self, zones: &Zones, seen_s: f64) -> Vec<(String, Option<f64>)> {
+        let columns = zones.iter().flat_map(|zone| {
+            let used = zone.used(self.poses, step_px(self.length_px));
+            let share = (seen_s > 0.0).then(|| rounded(used.time_s / seen_s, 4));
+            let distance_px = Some(used.distance_px);
+            let row: Row = vec![
+                ("s", Some(rounded(used.time_s, 3))),
+                ("share", share),
+                ("visits", Some(used.n_visits as f64)),
+                ("first_s", used.first_s.map(|s| rounded(s, 3))),
+                ("distance_bl", self.bl(distance_px)),
+                ("distance_cm", self.cm(distance_px)),
+            ];
+            let named = |(name, value): (_, _)| (format!("{}_{name}", zone.name), value);
+            row.into_iter().map(named).collect::<Vec<_>>()
+        });
+        columns.collect()
     }
 }
 
-fn header(row: &Row) -> String {
-    let names: Vec<&str> = row.iter().map(|(name, _)| *name).collect();
+fn header<Name: AsRef<str>>(row: &[(Name, Option<f64>)]) -> String {
+    let names: Vec<&str> = row.iter().map(|(name, _)| name.as_ref()).collect();
     names.join(",")
 }
 
 /// Returns the cells of a row, empty for null. Numbers need no quotes.
-fn cells(row: &Row) -> String {
+fn cells<Name>(row: &[(Name, Option<f64>)]) -> String {
     let cells = row
         .iter()
         .map(|(_, value)| text(*value).unwrap_or_default());
@@ -145,15 +167,16 @@ fn cells(row: &Row) -> String {
 }
 
 /// Returns a row as a JSON object, with its fields in order.
-fn object(row: &Row) -> String {
+fn object<Name: AsRef<str>>(row: &[(Name, Option<f64>)]) -> String {
     let fields = row.iter().map(|(name, value)| {
+        let name = name.as_ref();
         let value = text(*value).unwrap_or_else(|| "null".into());
         format!("\"{name}\":{value}")
     });
     format!("{{{}}}", fields.collect::<Vec<_>>().join(","))
 }
 
-fn json_with_header(schema: &str, row: &Row) -> String {
+fn json_with_header<Name: AsRef<str>>(schema: &str, row: &[(Name, Option<f64>)]) -> String {
     let version = env!("CARGO_PKG_VERSION");
     let fields = object(row);
     let fields = fields.trim_start_matches('{');
@@ -233,7 +256,7 @@ mod tests {
     fn without_a_scale_only_body_lengths_are_known() {
         let text = film(&poses(), None).motion_csv();
         assert_eq!(text.lines().nth(3), Some("2,0.2,,,2,,,,"));
-        let summary = write_summaries(&[("film", film(&poses(), None))]);
+        let summary = write_summaries(&[("film", film(&poses(), None))], &Zones::default());
         let row = summary.lines().nth(1);
         assert_eq!(row, Some("film,,20,,1.1,2,,1.8182,,2,,2,,0,0,"));
     }
@@ -249,7 +272,8 @@ mod tests {
         assert_eq!(file["frames"][2]["speed_cm_per_s"], json!(5));
         assert_eq!(file["frames"][11]["x_cm"], Value::Null);
         let summary: Value =
-            serde_json::from_str(&film(&poses(), scale()).summary_json()).expect("JSON");
+            serde_json::from_str(&film(&poses(), scale()).summary_json(&Zones::default()))
+                .expect("JSON");
         assert_eq!(summary["schema"], json!(SUMMARY_SCHEMA));
         assert_eq!(summary["distance_cm"], json!(5));
         assert_eq!(summary["mean_speed_cm_per_s"], json!(4.5455));
@@ -258,7 +282,11 @@ mod tests {
     #[test]
     fn each_film_is_a_row_of_the_summary() {
         let (one, two) = (poses(), poses());
-        let text = write_summaries(&[("a, \"b\"", film(&one, scale())), ("c", film(&two, None))]);
+        let zones: Zones = "right:rect:20,0,44,16".parse().unwrap();
+        let text = write_summaries(
+            &[("a, \"b\"", film(&one, scale())), ("c", film(&two, None))],
+            &zones,
+        );
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 3);
         assert!(lines[0].starts_with("library,px_per_cm,length_px,length_cm,seen_s,distance_bl,"));
@@ -268,5 +296,15 @@ mod tests {
             lines[1]
         );
         assert_eq!(lines[0].split(',').count(), lines[2].split(',').count());
+        // From 20 to 40 px in 0.6 s.
+        let columns =
+            "right_s,right_share,right_visits,right_first_s,right_distance_bl,right_distance_cm";
+        assert!(lines[0].ends_with(columns), "{}", lines[0]);
+        assert!(
+            lines[1].ends_with(",0.6,0.5455,1,0.5,1,2.5"),
+            "{}",
+            lines[1]
+        );
+        assert!(lines[2].ends_with(",0.6,0.5455,1,0.5,1,"), "{}", lines[2]);
     }
 }
