@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use crate::analysis::params::{AnimalAtParam, CutSprites, Follow, IgnoreParam};
+use crate::analysis::params::{AnimalAtParam, CutSprites, Follow};
 use crate::analysis::{Error, Params, analyze, preview};
 use crate::code::Code;
 use crate::cpu::Level;
@@ -400,13 +400,4 @@ fn preview_is_in_frames_and_pixels_of_the_film() {
         }
         assert_eq!(seen.others_px.len(), 1, "the other disc");
     }
-    params.animal_at = None;
-    let everywhere = [0, 0, 2 * WIDTH, 2 * HEIGHT];
-    params.ignore = vec![IgnoreParam {
-        box_px: everywhere,
-        from_s: None,
-        to_s: None,
-    }];
-    let ignored = preview(&film, 0.5, None, &params, &Silent).unwrap();
-    assert!(matches!(ignored.refused, Some(Error::NothingMoves)));
 }
