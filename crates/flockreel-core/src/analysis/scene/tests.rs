@@ -392,11 +392,7 @@ fn preview_is_in_frames_and_pixels_of_the_film() {
         let outline = seen.animal_px.as_ref().expect("the animal is found");
         for [px, py] in outline {
             let radius_px = libm::hypot(px - x, py - y);
-            assert!(
-                (radius_px - 16.0).abs() < 3.0,
-                "frame {}: {radius_px}",
-                seen.frame
-            );
+            assert!((radius_px - 16.0).abs() < 3.0, "{radius_px} in {seen:?}");
         }
         assert_eq!(seen.others_px.len(), 1, "the other disc");
     }
