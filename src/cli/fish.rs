@@ -1,10 +1,12 @@
-//! `flockreel fish`: writes a virtual fish that swims like the animal, as a video or a 3-D model
+//! `flockreel fish`: writes a virtual fish that swims like the animal, as a video or a 3-D model, or a school of them
 //! (docs/explanation/algorithms.md, "Virtual fish").
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 
+use super::flock::read_plan;
 use super::{Error, Listener, Summary, set};
 use crate::media::{self, Tool, VideoFormat, VideoWriter};
 use flockreel_core::fish::{self, Film, Params, side_by_side};
@@ -23,6 +25,9 @@ pub struct Args {
     /// File to write: a video (.mp4) or an animated 3-D model (.glb).
     #[arg(short, long, value_name = "MP4_OR_GLB")]
     output: PathBuf,
+    /// Write every individual of this plan, a flock.json of the same library, each as a virtual fish. Needs .glb.
+    #[arg(long, value_name = "FILE", conflicts_with = "side_by_side")]
+    flock: Option<PathBuf>,
     /// Show the animal on the left and the virtual fish on the right. Needs .mp4.
     #[arg(long)]
     side_by_side: bool,
@@ -46,13 +51,19 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let alike = fish::likeness(&stored.library, &film);
     let n_visible = motion.frames.iter().filter(|p| p.visible).count();
     let n_frames = motion.frames.len();
+    let start = Instant::now();
     match super::extension(&args.output).as_str() {
         "glb" if args.side_by_side => {
             return Err(Error::Usage(
                 "--side-by-side needs an output that ends in .mp4".into(),
             ));
         }
-        "glb" => super::write_file(&args.output, glb::write(motion, film.renderer().mesh()))?,
+        "glb" => super::write_file(&args.output, model(&stored.library, &film, &args)?)?,
+        "mp4" if args.flock.is_some() => {
+            return Err(Error::Usage(
+                "--flock needs an output that ends in .glb".into(),
+            ));
+        }
         "mp4" => write_video(&stored.library, &film, &args)?,
         other => {
             return Err(Error::Usage(format!(
@@ -64,10 +75,22 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         "output": args.output.display().to_string(),
         "frames": n_frames,
         "visible_frames": n_visible,
+        "written_s": rounded(start.elapsed().as_secs_f64(), 3),
         "compared_frames": alike.map_or(0, |alike| alike.n_frames),
         "silhouette_overlap": alike.map(|alike| rounded(alike.overlap, 3)),
         "color_difference_levels": alike.map(|alike| rounded(alike.color_levels, 1)),
     }))))
+}
+
+/// Returns the GLB file of the fish, or of a school of them.
+fn model(library: &Library, film: &Film, args: &Args) -> Result<Vec<u8>, Error> {
+    Ok(match &args.flock {
+        Some(plan) => {
+            let flock = read_plan(plan, library)?;
+            glb::write_school(&flock, library.poses.view, film)
+        }
+        None => glb::write(film.motion(), film.renderer().mesh()),
+    })
 }
 
 fn params_of(args: &Args) -> Result<Params, Error> {

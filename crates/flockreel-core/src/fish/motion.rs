@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::spine::N_JOINTS;
+use super::spine::{N_JOINTS, ORIGIN_S};
 use crate::geometry::Camera;
 use crate::library::Animal;
 
@@ -18,8 +18,17 @@ pub struct Motion {
     pub camera: Camera,
     /// Size of the fish.
     pub size: Animal,
+    /// Position along the body of the centroid of its silhouette: 0 = nose, 1 = tip of the tail.
+    pub center_s: f64,
     /// Posture in each frame, in order.
     pub frames: Vec<Posture>,
+}
+
+impl Motion {
+    /// Returns how far the origin of the fish lies ahead of the centroid of its silhouette, in metres.
+    pub fn origin_ahead_m(&self) -> f64 {
+        (self.center_s - ORIGIN_S) * self.size.length_m
+    }
 }
 
 /// Posture of the fish in one frame.
@@ -64,6 +73,12 @@ pub fn rotation_of(yaw_rad: f64, pitch_rad: f64, roll_rad: f64) -> DQuat {
     let upright = DQuat::from_mat3(&DMat3::from_cols(forward, left.cross(forward), left));
     let half = 0.5 * roll_rad;
     upright * DQuat::from_xyzw(libm::sin(half), 0.0, 0.0, libm::cos(half))
+}
+
+/// Returns the rotation of a fish that points along a unit vector, with its back up.
+pub fn upright_along(forward: DVec3) -> DQuat {
+    let pitch = libm::asin(forward.y.clamp(-1.0, 1.0));
+    rotation_of(libm::atan2(forward.z, forward.x), pitch, 0.0)
 }
 
 /// Returns the roll angle, in radians, of a fish that turns at `turn_rad_per_s` (positive = to its left)

@@ -11,7 +11,7 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::error::Error;
 use super::figure::{Figure, Fit, Midline};
-use super::motion::{Motion, Posture, bank_rad, nearest_sign, rotation_of, slerp};
+use super::motion::{Motion, Posture, bank_rad, nearest_sign, rotation_of, slerp, upright_along};
 use super::params::Params;
 use super::spine::{
     N_JOINTS, ORIGIN_S, Swimming, bend_of_turn_bl, effort_at, joint_angles_of_midline_rad,
@@ -36,6 +36,7 @@ pub fn drive(poses: &Poses, params: &Params, figure: Option<&Figure>) -> Result<
         image_size_px: poses.image_size_px,
         camera: setup.camera,
         size: setup.size,
+        center_s: setup.center_s(),
         frames: swim(&smooth, poses, &setup, params),
     })
 }
@@ -86,10 +87,14 @@ impl<'a> Setup<'a> {
 }
 
 impl Setup<'_> {
+    /// Returns the position along the body of the centroid of the silhouette.
+    fn center_s(&self) -> f64 {
+        self.figure.map_or(ORIGIN_S, |figure| figure.center_s)
+    }
+
     /// Returns the position of a fish whose silhouette has its centroid at a point.
     fn around_center(&self, center_m: DVec3, rotation: DQuat) -> DVec3 {
-        let center_s = self.figure.map_or(ORIGIN_S, |figure| figure.center_s);
-        center_m - rotation * DVec3::X * ((ORIGIN_S - center_s) * self.size.length_m)
+        center_m - rotation * DVec3::X * ((ORIGIN_S - self.center_s()) * self.size.length_m)
     }
 
     /// Returns the placement of a fitted figure. Its apparent depth follows from its length.
@@ -216,11 +221,6 @@ fn weighted_mean(values: &[Option<DVec2>], middle: usize, sigma_frames: f64) -> 
 fn toward_camera(heading: DVec2) -> DVec3 {
     let depth = (1.0 - heading.length_squared()).max(0.0).sqrt();
     DVec3::new(heading.x, heading.y, -depth)
-}
-
-fn upright_along(forward: DVec3) -> DQuat {
-    let pitch = libm::asin(forward.y.clamp(-1.0, 1.0));
-    rotation_of(libm::atan2(forward.z, forward.x), pitch, 0.0)
 }
 
 /// Returns the rotation of a fish in top view: the heading lies in the image plane, the back faces the

@@ -18,7 +18,7 @@ use super::motion::{Motion, Posture, bank_rad, rotation_of};
 use super::params::{Palette, Params};
 use super::render::Drawing;
 use super::scenery::{gravel_scene, tank_scene};
-use super::spine::{Swimming, bend_of_turn_bl, effort_at, joint_frames, spine_at_m};
+use super::spine::{ORIGIN_S, Swimming, bend_of_turn_bl, effort_at, joint_frames, spine_at_m};
 use super::swimmer::{self, PANE_Z_M, SwimmerState, TANK_M};
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
 use crate::geometry::{Camera, Rect};
@@ -89,6 +89,7 @@ impl SampleFilm {
                 medium_index: 1.0,
             },
             size,
+            center_s: ORIGIN_S,
             frames: states
                 .iter()
                 .map(|s| seen_from(params.view, posture(s, size)))
