@@ -10,7 +10,7 @@ use super::flock::read_plan;
 use super::{Error, Listener, Summary, set};
 use crate::media::{self, Tool, VideoFormat, VideoWriter};
 use flockreel_core::fish::{self, Film, Params, side_by_side};
-use flockreel_core::formats::{glb, params};
+use flockreel_core::formats::{fish_json, glb, params};
 use flockreel_core::geometry::rounded;
 use flockreel_core::library::Library;
 use flockreel_core::progress::Progress;
@@ -22,8 +22,8 @@ pub struct Args {
     /// Folder of the library, written by `analyze`.
     #[arg(value_name = "LIBRARY_DIR")]
     library: PathBuf,
-    /// File to write: a video (.mp4) or an animated 3-D model (.glb).
-    #[arg(short, long, value_name = "MP4_OR_GLB")]
+    /// File to write: a video (.mp4), an animated 3-D model (.glb), or its motion and tail beat as numbers (.json).
+    #[arg(short, long, value_name = "MP4_GLB_OR_JSON")]
     output: PathBuf,
     /// Write every individual of this plan, a flock.json of the same library, each as a virtual fish. Needs .glb.
     #[arg(long, value_name = "FILE", conflicts_with = "side_by_side")]
@@ -59,6 +59,9 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
             ));
         }
         "glb" => super::write_file(&args.output, model(&stored.library, &film, &args)?)?,
+        "json" if !args.side_by_side && args.flock.is_none() => {
+            super::write_file(&args.output, fish_json::write(motion))?;
+        }
         "mp4" if args.flock.is_some() => {
             return Err(Error::Usage(
                 "--flock needs an output that ends in .glb".into(),
@@ -67,7 +70,7 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         "mp4" => write_video(&stored.library, &film, &args)?,
         other => {
             return Err(Error::Usage(format!(
-                "the output must end in .mp4 or .glb: .{other}"
+                "the output must end in .mp4, .glb or .json: .{other}"
             )));
         }
     }

@@ -7,7 +7,7 @@
 use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 
-use crate::fish::motion::{nearest_sign, slerp, upright_along};
+use crate::fish::motion::{nearest_sign, slerp, toward_sight, upright_along};
 use crate::fish::spine::N_JOINTS;
 use crate::fish::{Film, Motion, Posture};
 use crate::flock::{Flock, Individual, Space};
@@ -146,10 +146,11 @@ impl School<'_> {
             View::Top => in_picture(filmed.rotation),
             View::Side => {
                 let sight = DVec3::from(self.space.lens.sight(place_bl));
-                let filmed_sight = sight_at(&self.motion.camera, filmed.position_m);
-                let seen = in_picture(toward(filmed_sight).inverse() * filmed.rotation);
+                let sight = DQuat::from_rotation_arc(DVec3::Z, sight);
+                let filmed_sight = toward_sight(&self.motion.camera, filmed.position_m);
+                let seen = in_picture(filmed_sight.inverse() * filmed.rotation);
                 // The back stays up at every place: only the direction turns with the line of sight.
-                let upright = upright_along(toward(sight) * seen * DVec3::X);
+                let upright = upright_along(sight * seen * DVec3::X);
                 let mut roll = upright_along(filmed.forward()).inverse() * filmed.rotation;
                 roll.x *= sign;
                 upright * roll
@@ -175,17 +176,6 @@ impl School<'_> {
         };
         Eye::of_camera(&camera, image_size_px)
     }
-}
-
-/// Returns the line of sight at a position behind the pane, a unit vector away from the camera.
-fn sight_at(camera: &Camera, position_m: DVec3) -> DVec3 {
-    let beyond_m = camera.medium_index * camera.apparent_from_true_depth_m(position_m.z);
-    DVec3::new(position_m.x, position_m.y, beyond_m).normalize()
-}
-
-/// Returns the shortest rotation from the optical axis to a line of sight.
-fn toward(sight: DVec3) -> DQuat {
-    DQuat::from_rotation_arc(DVec3::Z, sight)
 }
 
 /// Returns the rotation of the animal in a picture that is mirrored left to right. Its own left and right change too.
