@@ -24,6 +24,7 @@ use flockreel_core::formats::params;
 use flockreel_core::ids::{FishId, JobId, LibraryId};
 
 const FILES: Files = &[
+    ("fish.json", "application/json"),
     ("model.glb", "model/gltf-binary"),
     ("video.mp4", "video/mp4"),
 ];
@@ -169,6 +170,7 @@ pub(super) async fn delete_fish(access: Access, Id(id): Id) -> Result<StatusCode
 /// Download a file of a virtual fish.
 ///
 /// - `video.mp4`: the fish in front of the background of the footage
+/// - `fish.json`: its motion, and the measured beat of the tail
 /// - `model.glb`: an animated 3-D model (binary glTF)
 ///
 /// Range and conditional requests are supported.

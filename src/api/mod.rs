@@ -224,6 +224,7 @@ fn table() -> OpenApiRouter<AppState> {
             flocks::change_flock,
             flocks::delete_flock
         ))
+        .routes(routes!(flocks::school::get_school))
         .routes(routes!(flocks::get_flock_file))
         .routes(routes!(flocks::links::create_flock_link))
         .routes(routes!(fish::create_fish, fish::list_fish))

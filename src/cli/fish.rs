@@ -1,14 +1,16 @@
-//! `flockreel fish`: writes a virtual fish that swims like the animal, as a video or a 3-D model
+//! `flockreel fish`: writes a virtual fish that swims like the animal, as a video or a 3-D model, or a school of them
 //! (docs/explanation/algorithms.md, "Virtual fish").
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 
+use super::flock::read_plan;
 use super::{Error, Listener, Summary, set};
 use crate::media::{self, Tool, VideoFormat, VideoWriter};
 use flockreel_core::fish::{self, Film, Params, side_by_side};
-use flockreel_core::formats::{glb, params};
+use flockreel_core::formats::{fish_json, glb, params};
 use flockreel_core::geometry::rounded;
 use flockreel_core::library::Library;
 use flockreel_core::progress::Progress;
@@ -20,9 +22,12 @@ pub struct Args {
     /// Folder of the library, written by `analyze`.
     #[arg(value_name = "LIBRARY_DIR")]
     library: PathBuf,
-    /// File to write: a video (.mp4) or an animated 3-D model (.glb).
-    #[arg(short, long, value_name = "MP4_OR_GLB")]
+    /// File to write: a video (.mp4), an animated 3-D model (.glb), or its motion and tail beat as numbers (.json).
+    #[arg(short, long, value_name = "MP4_GLB_OR_JSON")]
     output: PathBuf,
+    /// Write every individual of this plan, a flock.json of the same library, each as a virtual fish. Needs .glb.
+    #[arg(long, value_name = "FILE", conflicts_with = "side_by_side")]
+    flock: Option<PathBuf>,
     /// Show the animal on the left and the virtual fish on the right. Needs .mp4.
     #[arg(long)]
     side_by_side: bool,
@@ -46,17 +51,26 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let alike = fish::likeness(&stored.library, &film);
     let n_visible = motion.frames.iter().filter(|p| p.visible).count();
     let n_frames = motion.frames.len();
+    let start = Instant::now();
     match super::extension(&args.output).as_str() {
         "glb" if args.side_by_side => {
             return Err(Error::Usage(
                 "--side-by-side needs an output that ends in .mp4".into(),
             ));
         }
-        "glb" => super::write_file(&args.output, glb::write(motion, film.renderer().mesh()))?,
+        "glb" => super::write_file(&args.output, model(&stored.library, &film, &args)?)?,
+        "json" if !args.side_by_side && args.flock.is_none() => {
+            super::write_file(&args.output, fish_json::write(motion))?;
+        }
+        "mp4" if args.flock.is_some() => {
+            return Err(Error::Usage(
+                "--flock needs an output that ends in .glb".into(),
+            ));
+        }
         "mp4" => write_video(&stored.library, &film, &args)?,
         other => {
             return Err(Error::Usage(format!(
-                "the output must end in .mp4 or .glb: .{other}"
+                "the output must end in .mp4, .glb or .json: .{other}"
             )));
         }
     }
@@ -64,10 +78,22 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
         "output": args.output.display().to_string(),
         "frames": n_frames,
         "visible_frames": n_visible,
+        "written_s": rounded(start.elapsed().as_secs_f64(), 3),
         "compared_frames": alike.map_or(0, |alike| alike.n_frames),
         "silhouette_overlap": alike.map(|alike| rounded(alike.overlap, 3)),
         "color_difference_levels": alike.map(|alike| rounded(alike.color_levels, 1)),
     }))))
+}
+
+/// Returns the GLB file of the fish, or of a school of them.
+fn model(library: &Library, film: &Film, args: &Args) -> Result<Vec<u8>, Error> {
+    Ok(match &args.flock {
+        Some(plan) => {
+            let flock = read_plan(plan, library)?;
+            glb::write_school(&flock, library.poses.view, film)
+        }
+        None => glb::write(film.motion(), film.renderer().mesh()),
+    })
 }
 
 fn params_of(args: &Args) -> Result<Params, Error> {

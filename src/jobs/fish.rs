@@ -1,6 +1,6 @@
 //! The fish job: makes a virtual fish from the poses of a library
 //! (docs/explanation/algorithms.md, "Virtual fish"; Nakajima et al., section 7). It writes `video.mp4`, in
-//! front of the background of the footage, and `model.glb`.
+//! front of the background of the footage, `model.glb` and `fish.json`.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -9,7 +9,7 @@ use super::{Attempt, Error, Extent, JobInput, Product, Stages, Subject};
 use crate::media::{VideoFormat, VideoWriter};
 use crate::store::jobs::Kind;
 use flockreel_core::fish::{Film, Params};
-use flockreel_core::formats::glb;
+use flockreel_core::formats::{fish_json, glb};
 use flockreel_core::ids::{FishId, LibraryId};
 use flockreel_core::progress::Progress;
 use flockreel_core::raster::{ColorSpec, Frame};
@@ -58,6 +58,7 @@ impl JobInput for Input {
         let motion = film.motion();
         let model = glb::write(motion, film.renderer().mesh());
         std::fs::write(attempt.folder().join("model.glb"), model)?;
+        std::fs::write(attempt.folder().join("fish.json"), fish_json::write(motion))?;
         let summary = Summary {
             fps: motion.fps,
             image_size_px: motion.image_size_px,

@@ -1,5 +1,5 @@
-//! Computations during a request: a planned flock without its video, all distances of a library as numbers, and its
-//! motion in centimetres. They queue no job and store no result. The computation is cancelled if the client disconnects.
+//! Computations during a request: a planned flock without its video, a flock as a 3-D model, all distances of a library
+//! as numbers, and its motion in centimetres. They queue no job and store no result. The computation is cancelled if the client disconnects.
 
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
@@ -17,9 +17,10 @@ use flockreel_core::analysis::similarity::distance::{
     ComparedSprites, DistanceMatrix, Distances, Side,
 };
 use flockreel_core::cpu::Level;
+use flockreel_core::fish;
 use flockreel_core::flock::{Flock, Params, plan_flock};
 use flockreel_core::formats::library_dir::{self, StoredLibrary};
-use flockreel_core::formats::npy;
+use flockreel_core::formats::{flock_json, glb, npy};
 use flockreel_core::library::Poses;
 use flockreel_core::progress::Progress;
 
@@ -89,6 +90,32 @@ pub async fn distance_file(
     };
     compute(context, owner, library, write).await
 }
+
+/// Makes the school of a flock: a GLB file with a virtual animal for each individual.
+pub async fn school(
+    context: &Context,
+    owner: &Owner,
+    library: &Library,
+    flock_folder: &str,
+    params: fish::Params,
+) -> Result<Vec<u8>, Error> {
+    let files = context.store.fetch(flock_folder, &[FLOCK]).await?;
+    let write = move |stored: StoredLibrary, _: &Draft, _: &Cancellation| {
+        let library = stored.library;
+        let flock = flock_json::read(&std::fs::read(files.path().join(FLOCK))?);
+        let flock = flock.map_err(std::io::Error::from)?;
+        if !flock.fits(&library) {
+            let why = "the stored flock does not fit its library";
+            return Err(std::io::Error::other(why).into());
+        }
+        let film = fish::Film::of(&library, &params)?;
+        Ok(glb::write_school(&flock, library.poses.view, &film))
+    };
+    compute(context, owner, library, write).await
+}
+
+/// File with the data of a flock.
+const FLOCK: &str = "flock.json";
 
 /// Computes a text from the poses of a library.
 pub async fn from_poses(

@@ -245,7 +245,7 @@ export default {
   "reel.file.video.mp4": "どこでも再生できる動画（透明度なし）", "reel.file.video.webm": "Webページ用の動画（透明度を保持）", "reel.file.video.mov": "編集用の動画（ProRes 4444、透明度を保持）",
   "reel.file.frames.zip": "全フレームのPNG画像（透明度を保持）", "reel.file.preview.gif": "チャット用の小さな動画", "reel.file.preview.webp": "チャット用の小さな動画（色数が多い）", "reel.file.poster.png": "動画の1フレーム", "reel.file.thumb.webp": "一覧用の小さな動く画像",
   "reel.file.overlay.mp4": "全個体のボイドの位置と方向を描いた動画", "reel.file.tracks.csv": "全フレームの各個体の位置、外接長方形、見えている割合（表計算、R、pandas用）",
-  "reel.file.ground-truth.zip": "マスク、COCO、MOT（追跡手法の学習と評価用）", "reel.file.flock.json": "群れの全データ（プログラム用）", "reel.file.flock.plan": "各個体のフレームと描画位置（別の環境での描画用、小容量）", "reel.file.plan.svg": "方向のグラフ（論文用）",
+  "reel.file.ground-truth.zip": "マスク、COCO、MOT（追跡手法の学習と評価用）", "reel.file.school.glb": "すべての個体を泳ぐ3Dモデルにしたもの（Blender、three.js用）", "reel.file.flock.json": "群れの全データ（プログラム用）", "reel.file.flock.plan": "各個体のフレームと描画位置（別の環境での描画用、小容量）", "reel.file.plan.svg": "方向のグラフ（論文用）",
   "reel.share": "共有", "reel.share.help": "リンクは期限まで、トークンなしで使えます。リンクを知っている人が開けるのは、共有したものだけです。",
   "reel.share.here": "リンクのアドレスが{host}で始まるため、このコンピューターでしか開けません。他のコンピューターで見るには、動画をダウンロードしてファイルを送ってください。",
   "reel.link.page": "動画のページ", "reel.link.file": "共有するもの", "reel.link.lasting": "有効期間", "reel.link.hour": "1時間", "reel.link.day": "1日", "reel.link.week": "1週間", "reel.link.make": "リンクを作成", "reel.link.until": "期限 {time}", "reel.link.qr": "QRコード", "reel.link.qr.none": "リンクが長すぎて、QRコードにできません。",

@@ -111,6 +111,7 @@ class Walk:
             self.call(f"GET /v1/{nouns}/{{id}}", {"id": ids[noun]})
             self.call(f"GET /v1/{nouns}/{{id}}/{{file}}", {"id": ids[noun], "file": file})
             self.call(f"PATCH /v1/{nouns}/{{id}}", {"id": ids[noun]}, body={"pinned": True})
+        self.call("GET /v1/flocks/{id}/school.glb", {"id": ids["flock"]}, query={"body": "goldfish"})
         part = self.call("GET /v1/footage/{id}/file", {"id": ids["footage"]}, headers={"Range": "bytes=0-9"})
         assert part.status_code == 206 and part.content == self.film[:10]
         self.call("GET /v1/footage/{id}", {"id": ids["footage"]})

@@ -4,6 +4,7 @@
 //! Stored files never change, so clients may cache them forever. The ETag is the SHA-256 of the content.
 
 pub(super) mod compression; // gzip
+pub(super) mod computed; // files that are not stored
 pub(super) mod if_match;
 pub(super) mod names; // names of saved files
 mod range;

@@ -4,6 +4,7 @@
 pub(super) mod create; // JSON or a form -> queued job
 pub(super) mod links; // signed links to files
 pub(super) mod preview; // flock.json without a video
+pub(super) mod school; // virtual animals in one 3-D model
 
 use axum::http::StatusCode;
 use serde::{Deserialize, Serialize};
@@ -204,6 +205,8 @@ pub(super) async fn delete_flock(access: Access, Id(id): Id) -> Result<StatusCod
 /// - `video.webm`, `video.mov`, `frames.zip`, `preview.gif`, `preview.webp`, `poster.png`: if
 ///   `render.formats` names them, by default only `poster.png`
 /// - `overlay.mp4`: the film with the position and heading of every boid, if `render.overlay` is true
+///
+/// `school.glb` has an operation of its own.
 ///
 /// Range and conditional requests are supported. A file that was not made fails with `not_found`.
 #[utoipa::path(get, path = "/v1/flocks/{id}/{file}",

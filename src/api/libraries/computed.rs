@@ -2,16 +2,15 @@
 //! motion in centimetres, which follows from its poses and its scale.
 
 use axum::body::{Body, Bytes};
-use axum::http::response::Builder;
-use axum::http::{Response, StatusCode, header};
+use axum::http::header;
 use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use tokio_util::io::ReaderStream;
 use utoipa::IntoParams;
 
 use super::saved_name;
-use crate::api::download::names::saved_as;
-use crate::api::download::{built, matches};
+use crate::api::download::built;
+use crate::api::download::computed::{is_known, not_modified, tagged, with_type};
 use crate::api::extract::{Access, Conditions};
 use crate::api::problem::{Answer, Problem};
 use crate::api::stored;
@@ -135,28 +134,4 @@ async fn distance_array(access: &Access, library: &Library, conditions: &Conditi
     let answer = with_type(answer, "application/octet-stream", &name);
     let answer = answer.header(header::CONTENT_LENGTH, n_bytes);
     built(answer.body(Body::from_stream(file)))
-}
-
-fn tagged(etag: &str, cache_control: &str) -> Builder {
-    let answer = Response::builder().header(header::ETAG, etag);
-    answer.header(header::CACHE_CONTROL, cache_control)
-}
-
-fn with_type(answer: Builder, media_type: &'static str, saved_name: &str) -> Builder {
-    let answer = answer.header(header::CONTENT_TYPE, media_type);
-    answer.header(
-        header::CONTENT_DISPOSITION,
-        saved_as(media_type, saved_name),
-    )
-}
-
-/// Returns whether the client has the file with this tag.
-fn is_known(conditions: &Conditions, etag: &str) -> bool {
-    let known = conditions.headers.get(header::IF_NONE_MATCH);
-    let known = known.and_then(|tags| tags.to_str().ok());
-    known.is_some_and(|tags| matches(tags, etag))
-}
-
-fn not_modified(answer: Builder) -> Result<Response<Body>, Problem> {
-    built(answer.status(StatusCode::NOT_MODIFIED).body(Body::empty()))
 }

@@ -67,7 +67,11 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     let library = super::read_library(&args.library, &args.outputs.output)?.library;
     let progress = Listener::new();
     let flock = match &args.from {
-        Some(path) => read_plan(path, &library, params)?,
+        Some(path) => {
+            let mut flock = read_plan(path, &library)?;
+            flock.params.render = params.render;
+            flock
+        }
         None => plan_flock(&library, &params, &progress)
             .map_err(|error| Error::work(error.code(), &error))?,
     };
@@ -115,18 +119,16 @@ fn summary(args: &Args, flock: &Flock, rendered: Duration) -> Summary {
     }))
 }
 
-/// Reads an existing plan, to be filmed with the `render` parameters of `params`. Fails if it belongs to
-/// another library.
-fn read_plan(path: &Path, library: &Library, params: Params) -> Result<Flock, Error> {
+/// Reads an existing plan. Fails if it belongs to another library.
+pub(super) fn read_plan(path: &Path, library: &Library) -> Result<Flock, Error> {
     let refused = |why: &str| Error::Usage(format!("{why}: {}", path.display()));
     let bytes = std::fs::read(path)
         .map_err(|cause| refused(&format!("the plan cannot be read: {cause}")))?;
-    let mut flock =
+    let flock =
         flock_json::read(&bytes).map_err(|cause| refused(&format!("not a flock.json: {cause}")))?;
     if !flock.fits(library) {
         return Err(refused("the plan belongs to another library"));
     }
-    flock.params.render = params.render;
     Ok(flock)
 }
 

@@ -30,6 +30,6 @@ pub use error::Error;
 pub use figure::Figure;
 pub use film::Film;
 pub use likeness::{Likeness, likeness};
-pub use motion::{Motion, Posture};
+pub use motion::{Beat, Motion, Posture};
 pub use params::{Body, Palette, Params};
 pub use render::Renderer;

@@ -3,7 +3,7 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
-use super::spine::N_JOINTS;
+use super::spine::{N_JOINTS, ORIGIN_S};
 use crate::geometry::Camera;
 use crate::library::Animal;
 
@@ -18,8 +18,40 @@ pub struct Motion {
     pub camera: Camera,
     /// Size of the fish.
     pub size: Animal,
+    /// Position along the body of the centroid of its silhouette: 0 = nose, 1 = tip of the tail.
+    pub center_s: f64,
     /// Posture in each frame, in order.
     pub frames: Vec<Posture>,
+    /// Rate of the tail beat over the film, hertz; 0 if no frame shows it.
+    pub beat_hz: f64,
+    /// Measured beat of the tail in each frame; `None` where it does not show.
+    pub beats: Vec<Option<Beat>>,
+}
+
+impl Motion {
+    /// Returns how far the origin of the fish lies ahead of the centroid of its silhouette, in metres.
+    pub fn origin_ahead_m(&self) -> f64 {
+        (self.center_s - ORIGIN_S) * self.size.length_m
+    }
+}
+
+/// Beat of the tail in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beat {
+    /// Bend of the body to the animal's left, in body lengths: the factor of (s - 0.2) squared.
+    pub bend_bl: f64,
+    /// Angle between the body's axis and the line from the first joint to the tail tip, radians; positive to the
+    /// animal's left.
+    pub tail_tip_rad: f64,
+    /// Probability that this angle, or with an unknown side its size, is within 8 degrees of the true one.
+    pub tail_tip_confidence: f64,
+    /// Phase of the tail beat, 0..1 turns: 0 when the wave of `Swimming` begins at the nose. `None` if it is not surely
+    /// within 45 degrees of the true one.
+    pub phase_turns: Option<f64>,
+    /// Probability that the phase is within 45 degrees of the true one.
+    pub phase_confidence: f64,
+    /// Probability that left and right are right, 0.5..=1. 0.5 = unknown.
+    pub side_confidence: f64,
 }
 
 /// Posture of the fish in one frame.
@@ -64,6 +96,20 @@ pub fn rotation_of(yaw_rad: f64, pitch_rad: f64, roll_rad: f64) -> DQuat {
     let upright = DQuat::from_mat3(&DMat3::from_cols(forward, left.cross(forward), left));
     let half = 0.5 * roll_rad;
     upright * DQuat::from_xyzw(libm::sin(half), 0.0, 0.0, libm::cos(half))
+}
+
+/// Returns the rotation of a fish that points along a unit vector, with its back up.
+pub fn upright_along(forward: DVec3) -> DQuat {
+    let pitch = libm::asin(forward.y.clamp(-1.0, 1.0));
+    rotation_of(libm::atan2(forward.z, forward.x), pitch, 0.0)
+}
+
+/// Returns the shortest rotation from the optical axis to the line of sight at a position. Multiplied by it, a rotation
+/// relative to the line of sight is one in the camera frame.
+pub fn toward_sight(camera: &Camera, position_m: DVec3) -> DQuat {
+    let beyond_m = camera.medium_index * camera.apparent_from_true_depth_m(position_m.z);
+    let sight = DVec3::new(position_m.x, position_m.y, beyond_m);
+    DQuat::from_rotation_arc(DVec3::Z, sight.normalize())
 }
 
 /// Returns the roll angle, in radians, of a fish that turns at `turn_rad_per_s` (positive = to its left)

@@ -50,6 +50,15 @@ pub struct Swimming {
 }
 
 impl Swimming {
+    /// Returns the swimming whose wave has the given parts: effort times cosine and sine of the phase.
+    pub fn of_wave(bend_bl: f64, [cosine, sine]: [f64; 2]) -> Swimming {
+        Swimming {
+            phase_turns: libm::atan2(sine, cosine) / TAU,
+            effort: cosine.hypot(sine),
+            bend_bl,
+        }
+    }
+
     /// Returns the sideways displacement of the spine at `s`, in body lengths, positive to the fish's left.
     pub fn lateral_bl(&self, s: f64) -> f64 {
         let amplitude = self.effort * (A0_BL + A2_BL * s * s);
@@ -64,6 +73,23 @@ impl Swimming {
             libm::atan2(self.lateral_bl(to) - self.lateral_bl(from), to - from)
         })
     }
+}
+
+/// Returns how far the spine at `s` lies to the left of the first joint, in body lengths, for a bend of 1 and for each
+/// part of the wave (`Swimming::of_wave`). The head is stiff.
+pub(super) fn lateral_parts_bl(s: f64) -> [f64; 3] {
+    [(1.0, [0.0; 2]), (0.0, [1.0, 0.0]), (0.0, [0.0, 1.0])].map(|(bend_bl, wave)| {
+        let swimming = Swimming::of_wave(bend_bl, wave);
+        swimming.lateral_bl(s) - swimming.lateral_bl(JOINT_S[0])
+    })
+}
+
+/// Returns the angle between the body's axis and the line from the first joint to the tail tip, in radians; positive
+/// to the animal's left.
+pub fn tail_tip_rad(angles_rad: &[f64; N_JOINTS]) -> f64 {
+    let joints = joint_frames(1.0, angles_rad);
+    let tail = spine_at_m(1.0, &joints, 1.0) - joints[0].0;
+    libm::atan2(tail.z, -tail.x)
 }
 
 /// Returns the bend of a body that turns to the left at a rate in radians a second.

@@ -7,15 +7,21 @@
 //! its heading changes sides, it turns by way of the camera. Short gaps are filled by interpolation. In
 //! longer gaps the fish is invisible.
 
+mod time; // gaps and smoothing
+
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
+use self::time::{fill_gaps, smoothed, window};
 use super::error::Error;
+use super::figure::course::{self, Bend, Evidence};
 use super::figure::{Figure, Fit, Midline};
-use super::motion::{Motion, Posture, bank_rad, nearest_sign, rotation_of, slerp};
+use super::motion::{
+    Beat, Motion, Posture, bank_rad, nearest_sign, rotation_of, toward_sight, upright_along,
+};
 use super::params::Params;
 use super::spine::{
     N_JOINTS, ORIGIN_S, Swimming, bend_of_turn_bl, effort_at, joint_angles_of_midline_rad,
-    joint_frames, spine_at_m, tail_beat_hz,
+    joint_frames, spine_at_m, tail_beat_hz, tail_tip_rad,
 };
 use crate::geometry::Camera;
 use crate::library::{Animal, Pose, Poses, View};
@@ -30,13 +36,23 @@ pub fn drive(poses: &Poses, params: &Params, figure: Option<&Figure>) -> Result<
     let setup = Setup::new(poses, params, figure)?;
     let measured = place_all(poses, &setup, params);
     let filled = fill_gaps(&measured, (params.bridge_s * poses.fps).round() as usize);
-    let smooth = smoothed(&filled, params.smooth_s * poses.fps);
+    let mut smooth = smoothed(&filled, params.smooth_s * poses.fps);
+    let (beat_hz, bends) = setup.bends(&measured);
+    let beats = setup.beats(&measured, &bends, &poses.frames);
+    for (placement, bend) in smooth.iter_mut().zip(&bends) {
+        if let Some(placement) = placement {
+            placement.bend = Some(*bend);
+        }
+    }
     Ok(Motion {
         fps: poses.fps,
         image_size_px: poses.image_size_px,
         camera: setup.camera,
         size: setup.size,
+        center_s: setup.center_s(),
         frames: swim(&smooth, poses, &setup, params),
+        beat_hz,
+        beats,
     })
 }
 
@@ -86,22 +102,67 @@ impl<'a> Setup<'a> {
 }
 
 impl Setup<'_> {
+    /// Returns the position along the body of the centroid of the silhouette.
+    fn center_s(&self) -> f64 {
+        self.figure.map_or(ORIGIN_S, |figure| figure.center_s)
+    }
+
+    /// Returns the rate of the tail beat and the bend in every frame; empty if no frame shows one.
+    fn bends(&self, placements: &[Option<Placement>]) -> (f64, Vec<Bend>) {
+        if let Some(figure) = self.figure.filter(|figure| !figure.bends.is_empty()) {
+            return (figure.beat_hz, figure.bends.clone());
+        }
+        let angles = placements.iter().map(|one| one.as_ref()?.joint_angles_rad);
+        let evidence: Vec<Evidence> = angles
+            .map(|angles| angles.map_or(Evidence::NONE, |angles| Evidence::of_spine(&angles)))
+            .collect();
+        if self.view == View::Side {
+            return (0.0, Vec::new());
+        }
+        course::bends(&evidence, self.fps)
+    }
+
+    /// Returns the beat of the tail in every frame in which the animal was found and the beat shows. From above the angle
+    /// of the tail is that of the midline.
+    fn beats(
+        &self,
+        placements: &[Option<Placement>],
+        bends: &[Bend],
+        poses: &[Pose],
+    ) -> Vec<Option<Beat>> {
+        let beat = |k: usize| {
+            let angles = placements[k]?.joint_angles_rad;
+            let side = match self.view {
+                View::Top => 1.0,
+                View::Side => poses[k].depth_sign_confidence.unwrap_or(0.5),
+            };
+            let beat = bends.get(k)?.beat(side)?;
+            let tail_tip_rad = angles.map_or(beat.tail_tip_rad, |angles| tail_tip_rad(&angles));
+            Some(Beat {
+                tail_tip_rad,
+                ..beat
+            })
+        };
+        (0..placements.len()).map(beat).collect()
+    }
+
     /// Returns the position of a fish whose silhouette has its centroid at a point.
     fn around_center(&self, center_m: DVec3, rotation: DQuat) -> DVec3 {
-        let center_s = self.figure.map_or(ORIGIN_S, |figure| figure.center_s);
-        center_m - rotation * DVec3::X * ((ORIGIN_S - center_s) * self.size.length_m)
+        center_m - rotation * DVec3::X * ((ORIGIN_S - self.center_s()) * self.size.length_m)
     }
 
     /// Returns the placement of a fitted figure. Its apparent depth follows from its length.
     fn fitted(&self, fit: &Fit) -> Placement {
-        let rotation = rotation_of(fit.yaw_rad, fit.pitch_rad, 0.0);
         let z_apparent_m = self.size.length_m * self.camera.focal_px() / fit.length_px;
-        let center_m = self.camera.point_in_camera(fit.center_px, z_apparent_m);
+        let center_m = DVec3::from(self.camera.point_in_camera(fit.center_px, z_apparent_m));
+        // The fit has no perspective: its direction is that relative to the line of sight.
+        let seen = rotation_of(fit.yaw_rad, fit.pitch_rad, 0.0);
+        let rotation = toward_sight(&self.camera, center_m) * seen;
         Placement {
-            position_m: self.around_center(center_m.into(), rotation),
+            position_m: self.around_center(center_m, rotation),
             rotation,
             joint_angles_rad: None,
-            bend: [fit.bend_bl, libm::sin(fit.yaw_rad).abs()],
+            bend: None,
         }
     }
 
@@ -137,8 +198,8 @@ struct Placement {
     position_m: DVec3,
     rotation: DQuat,
     joint_angles_rad: Option<[f64; N_JOINTS]>,
-    /// Bend of a fitted body, in body lengths (see `Swimming`), and how far it shows, 0..=1; 0 if unknown.
-    bend: [f64; 2],
+    /// Bend over all frames, if they show one.
+    bend: Option<Bend>,
 }
 
 fn place_all(poses: &Poses, setup: &Setup, params: &Params) -> Vec<Option<Placement>> {
@@ -168,7 +229,7 @@ fn place_all(poses: &Poses, setup: &Setup, params: &Params) -> Vec<Option<Placem
             position_m,
             rotation,
             joint_angles_rad,
-            bend: [0.0; 2],
+            bend: None,
         })
     };
     poses.frames.iter().enumerate().map(place).collect()
@@ -218,11 +279,6 @@ fn toward_camera(heading: DVec2) -> DVec3 {
     DVec3::new(heading.x, heading.y, -depth)
 }
 
-fn upright_along(forward: DVec3) -> DQuat {
-    let pitch = libm::asin(forward.y.clamp(-1.0, 1.0));
-    rotation_of(libm::atan2(forward.z, forward.x), pitch, 0.0)
-}
-
 /// Returns the rotation of a fish in top view: the heading lies in the image plane, the back faces the
 /// camera.
 fn seen_from_above(heading_rad: f64) -> DQuat {
@@ -232,78 +288,6 @@ fn seen_from_above(heading_rad: f64) -> DQuat {
         DVec3::Z,
         forward.cross(DVec3::Z),
     ))
-}
-
-/// Fills gaps of at most `longest` frames between two known frames by interpolation.
-fn fill_gaps(measured: &[Option<Placement>], longest: usize) -> Vec<Option<Placement>> {
-    let mut filled = measured.to_vec();
-    let known = (0..)
-        .zip(measured)
-        .filter_map(|(k, placement)| Some((k, (*placement)?)));
-    let known: Vec<(usize, Placement)> = known.collect();
-    for pair in known.windows(2) {
-        let [(from, a), (to, b)] = [pair[0], pair[1]];
-        if to - from - 1 > longest {
-            continue;
-        }
-        for k in from + 1..to {
-            let share = (k - from) as f64 / (to - from) as f64;
-            filled[k] = Some(between(&a, &b, share));
-        }
-    }
-    filled
-}
-
-fn between(a: &Placement, b: &Placement, share: f64) -> Placement {
-    let joints = a.joint_angles_rad.zip(b.joint_angles_rad);
-    Placement {
-        position_m: a.position_m.lerp(b.position_m, share),
-        rotation: slerp(a.rotation, b.rotation, share),
-        bend: [0, 1].map(|c| a.bend[c] + share * (b.bend[c] - a.bend[c])),
-        joint_angles_rad: joints
-            .map(|(a, b)| std::array::from_fn(|j| a[j] + share * (b[j] - a[j]))),
-    }
-}
-
-/// Returns Gaussian means of positions and rotations over time, within each run without gaps. Joint angles
-/// stay unchanged, and so does a fish that lies on a midline.
-fn smoothed(placements: &[Option<Placement>], sigma_frames: f64) -> Vec<Option<Placement>> {
-    let around = |k: usize| {
-        let middle = placements[k]?;
-        // A fish on a midline is placed by all of its points.
-        if middle.joint_angles_rad.is_some() {
-            return Some(middle);
-        }
-        let (mut position, mut total) = (DVec3::ZERO, 0.0);
-        let mut turn = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
-        let unbroken = |other: usize| {
-            let (lo, hi) = (other.min(k), other.max(k));
-            placements[lo..=hi].iter().all(Option::is_some)
-        };
-        for (other, weight) in window(placements.len(), k, sigma_frames) {
-            let Some(near) = placements[other].filter(|_| unbroken(other)) else {
-                continue;
-            };
-            position += weight * near.position_m;
-            turn += nearest_sign(middle.rotation, near.rotation) * weight;
-            total += weight;
-        }
-        Some(Placement {
-            position_m: position / total,
-            rotation: turn.normalize(),
-            ..middle
-        })
-    };
-    (0..placements.len()).map(around).collect()
-}
-
-/// Returns the indices within three standard deviations of `middle`, with their Gaussian weights.
-fn window(n: usize, middle: usize, sigma_frames: f64) -> impl Iterator<Item = (usize, f64)> {
-    let reach = (3.0 * sigma_frames).floor() as usize;
-    (middle.saturating_sub(reach)..(middle + reach + 1).min(n)).map(move |k| {
-        let off = (k as f64 - middle as f64) / sigma_frames.max(1e-9);
-        (k, libm::exp(-0.5 * off * off))
-    })
 }
 
 /// Returns the posture of each frame: the body bends along the midline, else in the swimming wave, and
@@ -334,14 +318,24 @@ fn swim(
         let measured_hz = poses.tail_beat_hz(k);
         let beat_hz = measured_hz.unwrap_or(tail_beat_hz(speed_bl_per_s));
         phase_turns += beat_hz.min(0.45 * setup.fps) / setup.fps;
-        // Where the bend shows, it is the fitted one; where it does not, it follows from speed and turn.
-        let [bend_bl, shown] = here.bend;
         let turn_bl = bend_of_turn_bl(moving.turn_rad_per_s);
-        let swimming = Swimming {
+        let effort = effort_at(speed_bl_per_s);
+        let mut swimming = Swimming {
             phase_turns,
-            effort: effort_at(speed_bl_per_s) * (1.0 - shown),
-            bend_bl: turn_bl + shown * (bend_bl - turn_bl),
+            effort,
+            bend_bl: turn_bl,
         };
+        // As far as the frames show the bend, it is theirs; else it follows from speed and turn.
+        if let Some(bend) = here.bend {
+            let [bend_bl, cosine, sine] = bend.mean.to_array();
+            let (wave, told) = (Swimming::of_wave(bend_bl, [cosine, sine]), bend.told());
+            phase_turns = wave.phase_turns;
+            swimming = Swimming {
+                phase_turns,
+                effort: effort + told * (wave.effort - effort),
+                bend_bl: turn_bl + told * (bend_bl - turn_bl),
+            };
+        }
         let roll = match setup.view {
             View::Side => bank_rad(moving.turn_rad_per_s, moving.speed_m_per_s, params.bank_rad),
             View::Top => 0.0,

@@ -1,7 +1,9 @@
 //! Charts: where a point of the body lies in the picture of one frame.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::LazyLock;
 
+use crate::fish::spine::lateral_parts_bl;
 use crate::library::Pose;
 
 /// Map from body coordinates to the picture of one frame.
@@ -42,8 +44,8 @@ pub(in crate::fish) struct Fit {
     pub(in crate::fish) pitch_rad: f64,
     /// Length of the body seen broadside, pixels.
     pub(in crate::fish) length_px: f64,
-    /// Bend to the animal's left, in body lengths: the factor of (s - 0.2) squared.
-    pub(in crate::fish) bend_bl: f64,
+    /// Bend to the animal's left, in body lengths, and the two parts of the wave (`Swimming::of_wave`).
+    pub(in crate::fish) bend: [f64; 3],
 }
 
 impl Fit {
@@ -59,7 +61,7 @@ impl Fit {
             },
             pitch_rad: libm::asin(libm::sin(heading_rad)),
             length_px,
-            bend_bl: 0.0,
+            bend: [0.0; 3],
         })
     }
 
@@ -77,13 +79,13 @@ impl Fit {
             center_s,
             along_px: [-cos_yaw * cos, -sin].map(|v| v * self.length_px),
             across_px: [-cos_yaw * sin, cos].map(|v| v * self.length_px),
-            bent_px: -sin_yaw * self.length_px * self.bend_bl,
+            bent_px: SPINE.map(|parts| -sin_yaw * self.length_px * dot(&parts, &self.bend)),
         }
     }
 
     /// Moves the center by body coordinates, and makes the unit of length `scale` times as long.
     pub(super) fn rebase(&mut self, [ds, dt]: [f64; 2], scale: f64) {
-        self.bend_bl = 0.0;
+        self.bend = [0.0; 3];
         self.center_px = self.flat(0.0).image(ds, dt);
         self.length_px *= scale;
     }
@@ -98,8 +100,8 @@ pub(super) struct Flat {
     along_px: [f64; 2],
     /// Image of one body length across the body (to the belly).
     across_px: [f64; 2],
-    /// How far the bend moves a point one body length behind the stiff head, to the right.
-    bent_px: f64,
+    /// How far the bend moves points at even distances along the body to the right.
+    bent_px: [f64; N_SPINE],
 }
 
 impl Flat {
@@ -107,7 +109,7 @@ impl Flat {
     pub(super) fn image(&self, s: f64, t: f64) -> [f64; 2] {
         let ds = s - self.center_s;
         let at = |c: usize| self.center_px[c] + ds * self.along_px[c] + t * self.across_px[c];
-        [at(0) + self.bent_px * stiff(s) * stiff(s), at(1)]
+        [at(0) + self.bent_px(s)[0], at(1)]
     }
 
     /// Returns the body coordinates at an image point; `None` where the bent body folds, and for a body without
@@ -119,26 +121,63 @@ impl Flat {
             return None;
         }
         let (dx, dy) = (x - self.center_px[0], y - self.center_px[1]);
-        // Straight, the point would lie at `from`; the bend solves u + pull u^2 = from.
-        let from = stiff(self.center_s + (dx * by - dy * bx) / det);
-        let pull = self.bent_px * by / det;
-        let root = 1.0 + 4.0 * pull * from;
-        let behind = if pull.abs() < 1e-9 || from == 0.0 {
-            from
-        } else if root >= 0.0 {
-            (root.sqrt() - 1.0) / (2.0 * pull)
-        } else {
+        // Straight, the point would lie at `from`; the bend solves s + pull bent(s) = from.
+        let from = self.center_s + (dx * by - dy * bx) / det;
+        let pull = by / det;
+        let mut s = from;
+        for _ in 0..N_STEPS {
+            let [bent, slope] = self.bent_px(s);
+            let steep = 1.0 + pull * slope;
+            if steep < LEAST_SLOPE {
+                return None;
+            }
+            let gap = from - s - pull * bent;
+            s += gap / steep;
+            if gap.abs() < EXACT {
+                break;
+            }
+        }
+        let [bent, _] = self.bent_px(s);
+        if (from - s - pull * bent).abs() > NEAR {
             return None;
-        };
-        let dx = dx - self.bent_px * behind * behind;
-        let s = self.center_s + (dx * by - dy * bx) / det;
-        Some([s, (ax * dy - ay * dx) / det])
+        }
+        Some([s, (ax * dy - ay * (dx - bent)) / det])
+    }
+
+    /// Returns how far the bend moves a point to the right, pixels, and the change of that along the body.
+    fn bent_px(&self, s: f64) -> [f64; 2] {
+        let at = ((s - SPINE_FROM) * SPINE_PER_BL).clamp(0.0, N_SPINE as f64 - 1.001);
+        let k = at as usize;
+        let step = self.bent_px[k + 1] - self.bent_px[k];
+        [
+            self.bent_px[k] + (at - k as f64) * step,
+            step * SPINE_PER_BL,
+        ]
     }
 }
 
-/// Returns the distance behind the stiff head, body lengths; 0 in the head.
-fn stiff(s: f64) -> f64 {
-    (s - 0.2).max(0.0)
+/// Steps of Newton's method. Free choice; most points need 2.
+const N_STEPS: usize = 4;
+/// Least change of the image along the body, relative to a straight one: where it is 0, the body folds. Free choice.
+const LEAST_SLOPE: f64 = 0.1;
+/// Step at which the search ends, body lengths: far below a texel.
+const EXACT: f64 = 1e-4;
+/// Error along the body at which a point counts as found, body lengths. Free choice.
+const NEAR: f64 = 0.01;
+
+/// Displacements of the spine at even distances, for each part of the bend.
+static SPINE: LazyLock<[[f64; 3]; N_SPINE]> = LazyLock::new(|| {
+    std::array::from_fn(|k| lateral_parts_bl(SPINE_FROM + k as f64 / SPINE_PER_BL))
+});
+/// First of the even distances: the grids of the figure begin there, body lengths.
+const SPINE_FROM: f64 = -0.5;
+/// Even distances per body length. Free choice.
+const SPINE_PER_BL: f64 = 50.0;
+/// Number of even distances, up to the end of the grids.
+const N_SPINE: usize = 101;
+
+fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Midline with the distance of each point from the head.

@@ -11,7 +11,7 @@ use super::pixels::Pixels;
 
 /// Points of the picture and the alpha of the silhouette there.
 pub(super) struct Outline {
-    points: Vec<([f64; 2], f32)>,
+    pub(super) points: Vec<([f64; 2], f32)>,
 }
 
 /// Number of points at which the overlap is measured. Free choice.
@@ -77,9 +77,20 @@ impl Outline {
 
     /// Returns the place of the largest overlap near `start`.
     pub(super) fn fit(&self, sheet: &Sheet, center_s: f64, start: &Fit) -> Fit {
+        self.climb(sheet, center_s, start, &STEPS)
+    }
+
+    /// Returns the place of the largest overlap near `start`, bent as that.
+    pub(super) fn place(&self, sheet: &Sheet, center_s: f64, start: &Fit) -> Fit {
+        // The bend moves the place a little: a quarter of the steps of a search suffices.
+        let steps: Vec<f64> = STEPS[..5].iter().map(|step| 0.25 * step).collect();
+        self.climb(sheet, center_s, start, &steps)
+    }
+
+    fn climb(&self, sheet: &Sheet, center_s: f64, start: &Fit, steps: &[f64]) -> Fit {
         let mut best = *start;
         let mut most = self.overlap(sheet, center_s, &best);
-        let mut steps = STEPS;
+        let mut steps = steps.to_vec();
         for _ in 0..N_ROUNDS {
             let before = most;
             for (k, &step) in steps.iter().enumerate() {
@@ -92,7 +103,7 @@ impl Outline {
                 }
             }
             if most - before < LEAST_GAIN {
-                steps = steps.map(|step| 0.5 * step);
+                steps.iter_mut().for_each(|step| *step *= 0.5);
             }
             if steps[0] < LEAST_STEP {
                 break;
@@ -109,20 +120,20 @@ impl Outline {
             both += f64::from(alpha.min(other));
             either += f64::from(alpha.max(other));
         }
-        let bend = fit.bend_bl / USUAL_BEND_BL;
+        let bend = fit.bend[0] / USUAL_BEND_BL;
         both / either - BEND_COST * bend * bend
     }
 }
 
-/// Returns the fit with one of its six values changed by a step.
-fn changed(fit: &Fit, value: usize, step: f64) -> Fit {
+/// Returns the fit with one of its eight values changed by a step.
+pub(super) fn changed(fit: &Fit, value: usize, step: f64) -> Fit {
     let mut moved = *fit;
     match value {
         0 | 1 => moved.center_px[value] += step * fit.length_px,
         2 => moved.yaw_rad = (fit.yaw_rad + step).clamp(-PI, 0.0),
         3 => moved.pitch_rad = (fit.pitch_rad + step).clamp(-FRAC_PI_2, FRAC_PI_2),
         4 => moved.length_px *= libm::exp(step),
-        _ => moved.bend_bl += step,
+        _ => moved.bend[value - 5] += step,
     }
     moved
 }

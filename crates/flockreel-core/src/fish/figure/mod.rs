@@ -6,19 +6,25 @@
 //! left. Its alpha is the mean alpha of the frames, so fins that move are translucent at their edges.
 
 mod chart;
+pub(super) mod course;
+mod evidence;
 mod fit;
 mod flesh;
 mod grid;
 mod pixels;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use self::chart::Chart;
 pub(super) use self::chart::{Fit, Midline};
+use self::course::{Bend, Evidence};
 use self::fit::Outline;
 use self::grid::{Grid, Sheet};
 pub(super) use self::pixels::Pixels;
 use super::error::Error;
+use super::motion::toward_sight;
+use crate::geometry::Camera;
 use crate::library::{Library, Pose, View};
 use crate::order::{median, percentile};
 use crate::raster::RgbaImage;
@@ -37,6 +43,9 @@ pub struct Figure {
     pub(super) length_px: f64,
     /// Place of the figure in every frame; empty if the poses say it better: from above, or with a camera.
     pub(super) fits: Vec<Option<Fit>>,
+    /// Rate of the tail beat, hertz, and bend in every frame; empty from above, where the midline has it.
+    pub(super) beat_hz: f64,
+    pub(super) bends: Vec<Bend>,
 }
 
 /// Largest number of frames from which the figure is learned. Free choice.
@@ -82,6 +91,8 @@ impl Figure {
             sheet,
             length_px,
             fits: Vec::new(),
+            beat_hz: 0.0,
+            bends: Vec::new(),
         })
     }
 
@@ -158,25 +169,83 @@ impl Figure {
             center_s,
             length_px: usual_length_px(fits)?,
             fits: Vec::new(),
+            beat_hz: 0.0,
+            bends: Vec::new(),
         };
-        if library.poses.camera.is_none() || library.poses.animal.is_none() {
-            figure.fits = figure.fit_all(library);
-        }
+        figure.fit_all(library);
         Ok(figure)
     }
 
-    /// Returns the place of the figure in every frame in which it can be found.
-    fn fit_all(&self, library: &Library) -> Vec<Option<Fit>> {
-        let frames = library.poses.frames.par_iter().enumerate();
-        let fit = |(k, pose): (usize, &Pose)| {
-            let outline = Outline::new(&Pixels::read(library, k)?);
+    /// Finds the figure in every frame in which it can be found, bent as all frames together say.
+    fn fit_all(&mut self, library: &Library) {
+        let poses = &library.poses;
+        let frames = poses.frames.par_iter().enumerate();
+        let outlines: Vec<Option<Outline>> = frames
+            .map(|(k, _)| Some(Outline::new(&Pixels::read(library, k)?)))
+            .collect();
+        let (sheet, center_s) = (&self.sheet, self.center_s);
+        let search = |(outline, pose): (&Option<Outline>, &Pose)| {
             let start = Fit::start(pose, self.length_px)?;
-            Some(outline.search(&self.sheet, self.center_s, &start))
+            Some(outline.as_ref()?.search(sheet, center_s, &start))
         };
-        frames.map(fit).collect()
+        let frames = outlines.par_iter().zip(&poses.frames);
+        let mut fits: Vec<Option<Fit>> = frames.map(search).collect();
+        let sides: Vec<f64> = poses
+            .frames
+            .iter()
+            .map(|pose| side(pose, poses.camera))
+            .collect();
+        let mut bends = Vec::new();
+        for _ in 0..N_BENDS {
+            let frames = fits.par_iter().zip(&outlines).zip(&sides);
+            let evidence: Vec<Evidence> = frames
+                .map(|((fit, outline), side)| match (fit, outline) {
+                    (Some(fit), Some(outline)) => {
+                        let mut one = evidence::evidence(fit, outline, sheet, center_s);
+                        one.pull *= *side;
+                        one
+                    }
+                    _ => Evidence::NONE,
+                })
+                .collect();
+            (self.beat_hz, bends) = course::bends(&evidence, poses.fps);
+            let again = |((fit, outline), (bend, side)): (
+                (&Option<Fit>, &Option<Outline>),
+                (&Bend, &f64),
+            )| {
+                let bent = Fit {
+                    bend: (bend.mean * *side).to_array(),
+                    ..(*fit)?
+                };
+                Some(outline.as_ref()?.place(sheet, center_s, &bent))
+            };
+            let frames = fits.par_iter().zip(&outlines);
+            fits = frames
+                .zip(bends.par_iter().zip(&sides))
+                .map(again)
+                .collect();
+        }
+        self.bends = bends;
+        // Poses in space are better than fits without perspective.
+        if poses.camera.is_none() || poses.animal.is_none() {
+            self.fits = fits;
+        }
     }
 }
 
+/// Returns 1, or -1 where the animal is known to point away from the camera. A fit always points toward it, and its bend is
+/// then that to the other side.
+fn side(pose: &Pose, camera: Option<Camera>) -> f64 {
+    let known = pose.forward.zip(pose.position_m).zip(camera);
+    let points_away = known.is_some_and(|((forward, position_m), camera)| {
+        let sight = toward_sight(&camera, position_m.into()) * DVec3::Z;
+        sight.dot(forward.into()) > 0.0
+    });
+    if points_away { -1.0 } else { 1.0 }
+}
+
+/// Rounds of bending and placing. Free choice.
+const N_BENDS: usize = 2;
 /// Least length of the mean silhouette, as a share of the measured length. Free choice.
 const LEAST_LENGTH: f64 = 0.25;
 /// Rounds of averaging and fitting. Free choice; more change the figure little.

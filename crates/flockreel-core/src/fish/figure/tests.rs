@@ -32,7 +32,7 @@ fn fit(yaw_rad: f64, pitch_rad: f64, length_px: f64) -> Fit {
         yaw_rad,
         pitch_rad,
         length_px,
-        bend_bl: 0.0,
+        bend: [0.0; 3],
     }
 }
 
@@ -47,7 +47,7 @@ fn sheet_of(fit: Fit) -> (Sheet, Vec<Chart>, Vec<Pixels>) {
 #[test]
 fn bent_body_is_mapped_there_and_back() {
     let bent = Fit {
-        bend_bl: 0.3,
+        bend: [0.3, 0.2, -0.4],
         ..fit(-1.0, 0.2, 100.0)
     };
     let flat = bent.flat(0.5);
@@ -71,7 +71,7 @@ fn figure_is_found_where_it_was_drawn() {
             yaw_rad: if yaw_rad < -2.0 { -PI } else { 0.0 },
             pitch_rad: pitch_rad - 0.1,
             length_px: 85.0,
-            bend_bl: 0.0,
+            bend: [0.0; 3],
         };
         let got = Outline::new(&drawn(&wanted)).search(&sheet, 0.5, &start);
         let off = (got.center_px[0] - 80.0).hypot(got.center_px[1] - 60.0);
@@ -96,6 +96,8 @@ fn mesh() -> Mesh {
         center_s: 0.5,
         length_px: 100.0,
         fits: Vec::new(),
+        beat_hz: 0.0,
+        bends: Vec::new(),
     };
     figure.mesh(0.2, None)
 }

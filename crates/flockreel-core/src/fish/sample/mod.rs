@@ -18,7 +18,9 @@ use super::motion::{Motion, Posture, bank_rad, rotation_of};
 use super::params::{Palette, Params};
 use super::render::Drawing;
 use super::scenery::{gravel_scene, tank_scene};
-use super::spine::{Swimming, bend_of_turn_bl, effort_at, joint_frames, spine_at_m};
+use super::spine::{
+    ORIGIN_S, Swimming, bend_of_turn_bl, effort_at, joint_frames, spine_at_m, tail_tip_rad,
+};
 use super::swimmer::{self, PANE_Z_M, SwimmerState, TANK_M};
 use crate::footage::{FootageFormat, FrameSource, FrameStream, SourceError};
 use crate::geometry::{Camera, Rect};
@@ -89,10 +91,13 @@ impl SampleFilm {
                 medium_index: 1.0,
             },
             size,
+            center_s: ORIGIN_S,
             frames: states
                 .iter()
                 .map(|s| seen_from(params.view, posture(s, size)))
                 .collect(),
+            beat_hz: 0.0,
+            beats: vec![None; params.n_frames],
         };
         let scene = match params.view {
             View::Side => tank_scene(width, height, params.seed),
@@ -181,12 +186,9 @@ impl SampleFilm {
     }
 
     fn body(&self, posture: &Posture) -> BodyPose {
-        let length_m = self.motion().size.length_m;
-        let joints = joint_frames(length_m, &posture.joint_angles_rad);
-        let tail = spine_at_m(length_m, &joints, 1.0) - joints[0].0;
         BodyPose {
             joint_angles_rad: posture.joint_angles_rad,
-            tail_tip_rad: libm::atan2(tail.z, -tail.x),
+            tail_tip_rad: tail_tip_rad(&posture.joint_angles_rad),
             fin_spread_rad: self.film.renderer().mesh().tail_spread_rad(),
         }
     }

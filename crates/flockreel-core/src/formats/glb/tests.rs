@@ -3,10 +3,15 @@
 use glam::{DMat4, DQuat, DVec3};
 use gltf_json::Root;
 
+use gltf_json::animation::Property;
+
 use super::*;
 use crate::fish::Palette;
 use crate::fish::sample::{SampleFilm, SampleParams};
-use crate::fish::spine::joint_frames;
+use crate::fish::spine::{N_JOINTS, joint_frames};
+
+/// Index of the node that carries the motion of the only fish.
+const ROOT: u32 = 0;
 
 fn motion(n_frames: usize) -> Motion {
     let params = SampleParams {

@@ -3,9 +3,11 @@
 //! Numbers are rounded to their significant digits (`round`). Files stay readable, and equal measurements
 //! give equal bytes.
 
+pub(super) mod mover; // moving objects other than the animal
+
 use serde::{Deserialize, Serialize};
 
-use super::mover::MoverFile;
+use self::mover::MoverFile;
 use crate::analysis::Params;
 use crate::geometry::{Camera, Rect, rounded};
 use crate::library::{
