@@ -47,6 +47,7 @@ pub use problem::Problem;
 
 use download::compression;
 use download::if_match::check_if_match;
+use flocks::datasets;
 
 use access::{HostNames, OpenRequests, Rates, authenticate, guard, session};
 use monitoring::metrics::Metrics;
@@ -232,6 +233,18 @@ fn table() -> OpenApiRouter<AppState> {
             fish::delete_fish
         ))
         .routes(routes!(fish::get_fish_file))
+        .routes(routes!(
+            datasets::create::create_dataset,
+            datasets::list_datasets
+        ))
+        .routes(routes!(datasets::create::estimate_dataset))
+        .routes(routes!(datasets::create::preview_dataset))
+        .routes(routes!(
+            datasets::get_dataset,
+            datasets::change_dataset,
+            datasets::delete_dataset
+        ))
+        .routes(routes!(datasets::get_dataset_file))
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
         .routes(routes!(jobs::retry::retry_job))

@@ -13,7 +13,6 @@ use super::jobs::absent_result;
 use super::paging::{Listing, Page};
 use super::problem::{JsonAnswer, Problem};
 use crate::jobs::clock::now_ms;
-use crate::store::BlobFile;
 use crate::store::resources::{Property, Resource, ResourceFilter, ResourceKind};
 use flockreel_core::code::Code;
 
@@ -69,6 +68,17 @@ pub(super) struct FileView {
     media_type: &'static str,
     /// Size, bytes.
     size_bytes: i64,
+}
+
+impl FileView {
+    /// Returns the entry of a file with this name, media type and size.
+    pub(super) fn new((name, media_type): (&str, &'static str), size_bytes: i64) -> FileView {
+        FileView {
+            name: name.to_owned(),
+            media_type,
+            size_bytes,
+        }
+    }
 }
 
 /// Reference to a resource in a request: its id, or the word `sample` for the newest sample.
@@ -150,15 +160,8 @@ impl Access {
             stored.extend(self.store().files_of(folder).await?);
         }
         let files = stored.into_iter().filter_map(|file| {
-            let BlobFile {
-                name, size_bytes, ..
-            } = file;
-            let (_, media_type) = V::FILES.iter().find(|(known, _)| *known == name)?;
-            Some(FileView {
-                name,
-                media_type,
-                size_bytes,
-            })
+            let entry = V::FILES.iter().find(|(known, _)| *known == file.name);
+            Some(FileView::new(*entry?, file.size_bytes))
         });
         let files = files.collect();
         Ok(axum::Json(V::from_row(row)?.with_files(files)))

@@ -21,7 +21,7 @@ pub(in crate::jobs) const CHECK_TIME: Duration = Duration::from_secs(30);
 /// dropped, the child is killed.
 pub(in crate::jobs) async fn inspect(context: &Context, draft: &Draft) -> Result<Film, Error> {
     let (listener, subject) = (Listener::new(&[]), SubjectFiles::default());
-    let running = run_child(context, None, &subject, draft, &listener);
+    let running = run_child(context, None, &subject, draft, &listener, None);
     match timeout(context.check_time, running).await {
         Ok(Ok(End::Inspected(film))) => Ok(film),
         Ok(Ok(_)) => Err(std::io::Error::other("a check of received files has no result").into()),

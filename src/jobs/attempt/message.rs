@@ -17,10 +17,12 @@ use flockreel_core::ids::JobId;
 pub(super) struct Order {
     /// The job; `None` to check received files, which are in the folder of the child.
     pub(super) job: Option<Job>,
-    /// Folder with the files of the footage or library that a job works on; empty for a sample.
-    pub(super) subject: PathBuf,
+    /// Folders with the files of the footage or libraries that a job works on; none for a sample.
+    pub(super) subjects: Vec<PathBuf>,
     /// Folder with the files of the footage from which the library of a views job was made; else empty.
     pub(super) film: PathBuf,
+    /// Parts that earlier attempts at the job have kept.
+    pub(super) parts: Vec<Part>,
     /// Number of threads to use.
     pub(super) threads: usize,
     /// Limit of the memory, bytes.
@@ -46,6 +48,15 @@ pub(super) struct Job {
     pub(super) footage: Option<FootageSummary>,
 }
 
+/// A part of the result that an earlier attempt has kept.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Part {
+    /// Number of the part.
+    pub number: u32,
+    /// Folder with the files that later attempts need.
+    pub folder: PathBuf,
+}
+
 /// A line of the child.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -54,6 +65,9 @@ pub(super) enum Message {
     Progress(String, f64),
     /// Number of decoded frames, and the seconds that they took.
     Decoded(u64, f64),
+    /// A part of the result is finished and synced: its number, and the files in its folder. The worker stores it and
+    /// takes the folder away.
+    Part(u32, Vec<File>),
     /// The last line.
     End(End),
 }

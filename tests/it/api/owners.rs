@@ -14,7 +14,7 @@ use uuid::Uuid;
 use crate::common::TestApp;
 use crate::common::app::{json_of, routes};
 use crate::common::clip::TINY;
-use crate::common::results::{Results, id_in};
+use crate::common::results::{Results, dataset_of, id_in};
 
 /// How an operation accesses owned objects.
 enum Touch {
@@ -49,6 +49,10 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("GET", "/v1/fish", List),
         ("GET", "/v1/fish/{id}", Path("fish")),
         ("GET", "/v1/fish/{id}/{file}", Path("fish")),
+        ("GET", "/v1/datasets", List),
+        ("GET", "/v1/datasets/{id}", Path("datasets")),
+        ("GET", "/v1/datasets/{id}/{file}", Path("datasets")),
+        ("PATCH", "/v1/datasets/{id}", Path("datasets")),
         ("GET", "/v1/jobs", List),
         ("GET", "/v1/jobs/{id}", Path("jobs")),
         ("GET", "/v1/jobs/{id}/events", Path("jobs")),
@@ -62,6 +66,17 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
             Body("library_id", "libraries"),
         ),
         ("POST", "/v1/fish", Body("library_id", "libraries")),
+        ("POST", "/v1/datasets", Body("library_ids", "libraries")),
+        (
+            "POST",
+            "/v1/datasets/estimate",
+            Body("library_ids", "libraries"),
+        ),
+        (
+            "POST",
+            "/v1/datasets/preview",
+            Body("library_ids", "libraries"),
+        ),
         ("POST", "/v1/flocks/{id}/links", Path("flocks")),
         ("HEAD", "/v1/uploads/{id}", Path("uploads")),
         ("PATCH", "/v1/uploads/{id}", Path("uploads")),
@@ -69,6 +84,7 @@ fn table() -> Vec<(&'static str, &'static str, Touch)> {
         ("DELETE", "/v1/uploads/{id}", Path("uploads")),
         ("DELETE", "/v1/flocks/{id}", Path("flocks")),
         ("DELETE", "/v1/fish/{id}", Path("fish")),
+        ("DELETE", "/v1/datasets/{id}", Path("datasets")),
         ("DELETE", "/v1/libraries/{id}", Path("libraries")),
         ("DELETE", "/v1/footage/{id}", Path("footage")),
         ("GET", "/v1/jobs/{id}/refused.jpg", Nothing), // only for failed jobs: tests/it/api/jobs.rs
@@ -91,6 +107,7 @@ fn file_of(kind: &str) -> &'static str {
     match kind {
         "libraries" => "library.json",
         "flocks" => "flock.json",
+        "datasets" => "dataset.zip",
         _ => "video.mp4",
     }
 }
@@ -98,6 +115,7 @@ fn file_of(kind: &str) -> &'static str {
 /// Creates one object of every kind for the signed-in owner, with substitute results. Returns kinds and ids.
 async fn belongings(app: &TestApp) -> Vec<(&'static str, String)> {
     let results = Results::make(app, "film.mp4").await;
+    let dataset = dataset_of(app, &id_in(&results.library)).await;
     let upload = (app.post("/v1/uploads").header("tus-resumable", "1.0.0"))
         .header("upload-length", 9)
         .send();
@@ -108,6 +126,7 @@ async fn belongings(app: &TestApp) -> Vec<(&'static str, String)> {
         ("libraries", id_in(&results.library)),
         ("flocks", id_in(&results.flock)),
         ("fish", id_in(&results.fish)),
+        ("datasets", id_in(&dataset)),
         ("jobs", id_in(&results.analysis_job)),
     ]
 }
@@ -123,6 +142,7 @@ async fn response_of(
     let path = path.replace("{id}", id).replace("{file}", file_of(kind));
     let request = app.request(method.parse::<Method>().unwrap(), &path);
     let request = match touch {
+        Touch::Body(name @ "library_ids", _) => request.json(&json!({ *name: [id] })),
         Touch::Body(name, _) => request.json(&json!({ *name: id })),
         Touch::Path(_) if path.ends_with("/variants") => {
             let picture = write_rgb(&RgbImage::new(64, 64));
@@ -130,7 +150,7 @@ async fn response_of(
         }
         Touch::Path(_) if method == "POST" => request.json(&json!({})),
         Touch::Path("footage") if method == "PATCH" => request.json(&json!({"name": "x.mp4"})),
-        Touch::Path("libraries" | "flocks" | "fish") if method == "PATCH" => {
+        Touch::Path("libraries" | "flocks" | "fish" | "datasets") if method == "PATCH" => {
             request.json(&json!({"pinned": true}))
         }
         _ => request,
@@ -204,7 +224,8 @@ async fn foreign_id_gives_the_response_to_a_random_id() {
             // An object that the owner deleted is gone for the administrator too.
             let is_gone = *method == "DELETE" && allowed == &admin && status == 404;
             // A substitute library cannot be simulated.
-            let is_substitute = *path == "/v1/flocks/preview" && status == 500;
+            let is_drawn = *path == "/v1/flocks/preview" || path.starts_with("/v1/datasets");
+            let is_substitute = is_drawn && method == &"POST" && status == 500;
             assert!(
                 status < 300 || status == 409 || is_gone || is_substitute,
                 "{method} {path}: {status} {body}"

@@ -75,7 +75,8 @@ impl Folder {
         &self.path
     }
 
-    fn work(&self, name: &str) -> PathBuf {
+    /// Returns the path of a file in the work folder.
+    pub(super) fn work(&self, name: &str) -> PathBuf {
         self.path.join(WORK).join(name)
     }
 
