@@ -25,7 +25,8 @@ NOTE = "`scripts/reference.py` writes this page from the texts of the program. C
 ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("FLOCKREEL_")}
 # Nouns with parameters: command, schema of the parameters, and schema of a request, which has the presets.
 NOUNS = [("an analysis", "analyze", "AnalysisParams", "AnalysisOverrides"),
-         ("a flock", "flock", "FlockParams", "FlockOverrides"), ("a virtual fish", "fish", "FishParams", "FishRequest")]
+         ("a flock", "flock", "FlockParams", "FlockOverrides"), ("a virtual fish", "fish", "FishParams", "FishRequest"),
+         ("a data set", "dataset", "DatasetParams", "DatasetRequest")]
 DEFAULTS = {"FLOCKREEL_WORKERS": "half of the cores, at least 1, plus one"}  # those that depend on the machine
 
 
@@ -108,10 +109,10 @@ def settings(root, document):
 
 def parameters(schemas, noun, command, name, request):
     """Returns the section about the parameters of a noun, whose schema has this name."""
-    presets = [preset for preset in schemas[request]["properties"]["preset"]["enum"] if preset]
+    presets = [preset for preset in schemas[request]["properties"].get("preset", {"enum": []})["enum"] if preset]
     text = f"\n## Parameters of {noun}\n\nThe API takes them by name, and `flockreel {command} --set NAME=JSON` as well. "
     text += "`a.b` is the field `b` of the object `a`, and `[]` stands for each entry of a list.\n"
-    text += f"Presets: {codes(presets)}.\n"
+    text += f"Presets: {codes(presets)}.\n" if presets else ""
     return text + table(["parameter", "default", "values", "meaning"], *parameter_rows(schemas, schemas[name]))
 
 
@@ -125,7 +126,7 @@ def parameter_rows(schemas, schema, prefix=""):
         below = [one for one in (whole, *whole.get("oneOf", []), items, *items.get("oneOf", [])) if "properties" in one]
         default = "required" if name in schema.get("required", []) else f"`{json.dumps(field['default'])}`"
         prose = " ".join(inner.get("description", whole.get("description", "")).split())
-        if whole.get("type") != "object" or "oneOf" in field:
+        if whole.get("type") != "object" or "oneOf" in field or not below:
             rows.append([f"`{prefix}{name}`", default, values(whole, items), prose])
         for one in below:
             rows += parameter_rows(schemas, one, f"{prefix}{name}[]." if items else f"{prefix}{name}.")

@@ -24,7 +24,7 @@ function load() {
   return known;
 }
 
-/** Returns the fields of a flock, a virtual fish, or an analysis. @param {"Flock" | "Fish" | "Analysis"} [kind] @returns {Promise<Fields>} */
+/** Returns the fields of a flock, a virtual fish, a data set, or an analysis. @param {"Flock" | "Fish" | "Dataset" | "Analysis"} [kind] @returns {Promise<Fields>} */
 export async function loadFields(kind = "Flock") {
   const [schemas] = await Promise.all([load(), wordsOfService()]);
   return fieldsOf(schemas, `${kind}Params`, kind === "Analysis" ? "AnalysisOverrides" : `${kind}Request`);

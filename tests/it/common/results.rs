@@ -70,8 +70,7 @@ pub(crate) async fn dataset_of(app: &TestApp, library: &str) -> String {
     let (context, mut ids) = (&app.context, IdSequence::random());
     let queued = context.enqueue(&input, None, &account, &mut ids).await;
     let (_, id) = queued.unwrap();
-    let summary = json!({"library_ids": library_ids, "flocks": 1, "pictures": 1, "files": 1, "licence": null,
-        "source": null});
+    let summary = json!({"library_ids": library_ids, "flocks": 1, "pictures": 1, "licence": null, "source": null});
     let files = [("manifest.json", "{}"), ("entries", "PK")];
     let worker = Worker::new(with_script(context, &done(&files, &summary)));
     assert!(matches!(worker.step().await.unwrap(), Step::Done(_)));

@@ -54,8 +54,6 @@ pub struct Summary {
     pub flocks: u32,
     /// Number of pictures of all flocks.
     pub pictures: u64,
-    /// Number of files, with the manifest.
-    pub files: usize,
     /// Licence of the footage, as the user states it.
     pub licence: Option<String>,
     /// Source of the footage, as the user states it.
@@ -98,28 +96,27 @@ impl JobInput for Input {
         attempt.reporter.report("loading", 0.0);
         let (dataset, manifest) = self.load(attempt)?;
         let work = Work::begin(attempt, &dataset, &manifest)?;
-        let n = dataset.plan.sequences.len();
+        let n = dataset.plan.n_flocks();
         let parts: BTreeMap<u32, &Path> = (attempt.kept_parts().iter())
             .map(|part| (part.number, part.folder.as_path()))
             .collect();
-        for (k, sequence) in dataset.plan.sequences.iter().enumerate() {
+        for (k, sequence) in dataset.plan.sequences().enumerate() {
             let kept = parts.get(&sequence.number).copied();
-            if !work.restore(sequence, kept)? {
-                work.make(sequence)?;
+            if !work.restore(&sequence, kept)? {
+                work.make(&sequence)?;
             }
             attempt
                 .reporter
                 .report("drawing", (k + 1) as f64 / n as f64);
         }
         attempt.reporter.report("joining", 0.0);
-        let manifest = work.finish(manifest)?;
+        work.finish(manifest)?;
         let sheet = dataset.sheet(attempt.reporter)?;
         fs::write(attempt.folder().join(SHEET), picture::write_rgb(&sheet))?;
         let summary = Summary {
             library_ids: self.library_ids.clone(),
             flocks: self.params.flocks,
             pictures: u64::from(self.params.flocks) * u64::from(self.params.pictures),
-            files: manifest.files.len() + 1,
             licence: self.licence.clone(),
             source: self.source.clone(),
         };
@@ -232,7 +229,7 @@ impl<'a> Work<'a> {
     }
 
     /// Writes the files that belong to all flocks to the folder of the attempt, and removes the rest.
-    fn finish(self, manifest: Manifest) -> Result<Manifest, Error> {
+    fn finish(self, manifest: Manifest) -> Result<(), Error> {
         let (root, target) = (self.folder.path(), self.attempt.folder());
         let manifest = self.folder.finish(self.dataset, manifest)?;
         let mut piece = BufWriter::new(File::create(target.join(PIECE))?);
@@ -243,7 +240,7 @@ impl<'a> Work<'a> {
         }
         let last = Record::of(root, MANIFEST)?;
         rest.push(archive::append(&mut piece, root, last)?);
-        let names = self.dataset.plan.sequences.iter().map(Sequence::name);
+        let names = self.dataset.plan.sequences().map(|one| one.name());
         let indices = names.map(|name| {
             let index: Index = serde_json::from_slice(&fs::read(self.index(&name))?)?;
             Ok(index.entries)
@@ -257,8 +254,7 @@ impl<'a> Work<'a> {
         for name in [MANIFEST, "README.md"] {
             fs::copy(root.join(name), target.join(name))?;
         }
-        fs::remove_dir_all(&self.path)?;
-        Ok(manifest)
+        Ok(fs::remove_dir_all(&self.path)?)
     }
 }
 

@@ -103,10 +103,10 @@ impl Dataset {
     pub fn estimate(&self, progress: &dyn Progress) -> Result<Estimate, MakeError> {
         let n_pictures = u64::from(self.params.flocks) * u64::from(self.params.pictures);
         let (mut n_bytes, mut n_drawn, mut drawing_s) = (0, 0, 0.0);
-        let n_sequences = self.plan.sequences.len();
+        let n_sequences = self.plan.n_flocks();
         let n = n_sequences.min(N_ESTIMATED);
         for k in 0..n {
-            let sequence = &self.plan.sequences[k * n_sequences / n];
+            let sequence = &self.plan.sequence(k * n_sequences / n);
             let failed = |cause| MakeError::Flock {
                 number: sequence.number,
                 cause,
@@ -138,7 +138,7 @@ impl Dataset {
         manifest: Manifest,
         progress: &dyn Progress,
     ) -> Result<Made, MakeError> {
-        let n = self.plan.sequences.len();
+        let n = self.plan.n_flocks();
         if let Some(manifest) = manifest.finished_in(folder).map_err(FolderError::Io)? {
             folder::clean(folder)?;
             return Ok(Made {
@@ -148,7 +148,7 @@ impl Dataset {
         }
         let folder = Folder::open(folder, &manifest)?;
         let mut n_kept = 0;
-        for (k, sequence) in self.plan.sequences.iter().enumerate() {
+        for (k, sequence) in self.plan.sequences().enumerate() {
             let name = sequence.name();
             if folder.is_finished(&name)? {
                 n_kept += 1;
@@ -157,7 +157,7 @@ impl Dataset {
                     number: sequence.number,
                     cause,
                 };
-                let records = sequence::make(self, sequence, folder.path(), progress);
+                let records = sequence::make(self, &sequence, folder.path(), progress);
                 folder.finish_sequence(&name, &records.map_err(failed)?)?;
             }
             progress.report("drawing", (k + 1) as f64 / n as f64);

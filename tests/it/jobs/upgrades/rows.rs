@@ -26,7 +26,7 @@ pub(super) const FILES: [(i64, &str, &str, &[u8]); 11] = [
     (13, "footage/4", "video", FILM),
     (19, "views/70", "film.mp4", FILM),
     (21, "datasets/80", "manifest.json", RESULT),
-    (21, "datasets/80.1", "entries", RESULT),
+    (21, "datasets/82", "entries", RESULT),
 ];
 
 /// Schema and rows.
@@ -142,8 +142,9 @@ pub(super) const ROWS: [(i64, &str); 17] = [
             finished_ms) values
             (@81, 'dataset', 'done', '{\"library_ids\": [\"@uuid13\"]}', @80, 0, 0, 1, 1, 8000, 8001, 8002);
         insert into datasets (id, job_id, fence, folder, library_id, params, summary, size_bytes, created_ms, owner, used_ms)
-            values (@80, @81, 1, 'datasets/80', @13, '{}', '{}', 2, 8002, 'local', 8002);
+            values (@80, @81, 1, 'datasets/80', @13, '{}', '{\"library_ids\": [\"@uuid13\"],
+            \"flocks\": 1, \"pictures\": 1, \"licence\": null, \"source\": null}', 2, 8002, 'local', 8002);
         insert into job_parts (job_id, number, folder, size_bytes, owner)
-            values (@81, 0, 'datasets/80.1', 2, 'local');",
+            values (@81, 0, 'datasets/82', 2, 'local');",
     ),
 ];
