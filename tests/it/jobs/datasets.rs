@@ -143,7 +143,7 @@ async fn kept_when(app: &TestApp, job: &Value, n: usize) -> Vec<KeptPart> {
 async fn cancelled_data_set_goes_on_with_the_next_flock() {
     let app = TestApp::idle().await;
     let library = library(&app).await;
-    let request = request(&library, 12);
+    let request = request(&library, 6);
     let first = app.accept("/v1/datasets", request.clone()).await;
     let job = first["job_id"].clone();
     let worker = Worker::new(app.context.clone());
@@ -154,13 +154,13 @@ async fn cancelled_data_set_goes_on_with_the_next_flock() {
     assert!(matches!(running.await.unwrap(), Step::Cancelled(_)));
     let before = kept_when(&app, &job, 2).await;
     assert!(
-        before.len() < 12,
+        before.len() < 6,
         "the job was done before it was cancelled"
     );
     let retry = app.post(&format!("{path}/retry")).send().await.unwrap();
     assert_eq!(retry.status(), StatusCode::ACCEPTED);
     step(&app).await;
-    let after = kept_when(&app, &job, 12).await;
+    let after = kept_when(&app, &job, 6).await;
     assert_eq!(before, after[..before.len()], "kept flocks were made again");
     let second = app.accept("/v1/datasets", request).await;
     step(&app).await;
@@ -177,7 +177,7 @@ async fn cancelled_data_set_goes_on_with_the_next_flock() {
 async fn unfinished_data_set_counts_and_is_deleted_with_what_it_kept() {
     let app = TestApp::idle().await;
     let library = library(&app).await;
-    let made = app.accept("/v1/datasets", request(&library, 12)).await;
+    let made = app.accept("/v1/datasets", request(&library, 8)).await;
     let worker = Worker::new(app.context.clone());
     let running = tokio::spawn(async move { worker.step().await.unwrap() });
     kept_when(&app, &made["job_id"], 1).await;
