@@ -260,7 +260,7 @@ export default {
   "data.sheet": "正解を重ねた9枚の見本", "data.sheet.what": "輪郭線はマスクです。白い点は見えているキーポイント、赤い点は隠れているキーポイントです。",
   "data.size": { other: "画像{pictures}枚、約{size}、描画に約{n}分" }, "data.started": "開始しました：{size}。",
   "data.of": "{film}、画像{pictures}枚", "data.flocks": { other: "群れ{n}個" }, "data.save": "ZIPを保存", "data.save.of": "ZIPを保存：{name}", "data.file.of": "{name}の{file}", "data.sheet.of": "{name}の見本",
-  "set.flocks": "群れの数", "set.pictures": "群れごとの画像数", "set.every": "何フレームごとに1枚か", "set.presets": "行動", "set.formats": "正解ファイル", "set.picture": "画像の形式", "set.picture.jpeg": "JPEG形式", "set.picture.png": "PNG形式（劣化なし）",
+  "set.flocks": "群れの数", "set.pictures": "群れごとの画像数", "set.every": "何フレームごとに1枚か", "set.counts": "群れの個体数（最小、最大）", "set.presets": "行動", "set.formats": "正解ファイル", "set.picture": "画像の形式", "set.picture.jpeg": "JPEG形式", "set.picture.png": "PNG形式（劣化なし）",
   "set.backgrounds.plate": "動画の背景を使う重み", "set.backgrounds.color": "単色の背景を使う重み", "set.haze_per_bl": "かすみ（最小、最大）", "set.shadow": "影の濃さ（最小、最大）", "set.scale": "動画に対する大きさ（最小、最大）", "set.size_px": "幅と高さ（画素）",
   "set.gain": "明るさ（最小、最大）", "set.color_gain": "色ごとの明るさ（最小、最大）", "set.blur_px": "ぼけ（画素、最小、最大）", "set.noise": "ノイズ（最小、最大）", "set.jpeg_quality": "JPEGの品質（最小、最大）", "set.split": "学習・検証・試験の割合",
   "set.label.coco": "COCO形式（マスク、枠、キーポイント）", "set.label.mot": "MOTChallenge形式の軌跡", "set.label.yolo_detect": "YOLO形式の枠", "set.label.yolo_segment": "YOLO形式の輪郭", "set.label.yolo_pose": "YOLO形式のキーポイント", "set.label.dlc": "DeepLabCut形式", "set.label.tracks": "軌跡の表", "set.label.masks": "個体番号の画像", "set.label.depth": "奥行きの順序",

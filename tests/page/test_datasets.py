@@ -25,8 +25,8 @@ def small(page):
     """Sets a small data set."""
     for name, value in (("Flocks", "3"), ("Pictures of each flock", "2")):
         page.locator(".control", has_text=name).first.get_by_role("spinbutton").fill(value)
-    page.get_by_role("textbox", name="How many").fill("1, 3")
-    page.get_by_role("textbox", name="How many").press("Enter")
+    page.get_by_role("textbox", name="Animals in a flock").fill("1, 3")
+    page.get_by_role("textbox", name="Animals in a flock").press("Enter")
 
 
 def test_a_data_set_is_chosen_seen_made_saved_and_deleted(place, filled_service):
@@ -54,8 +54,8 @@ def test_a_data_set_is_chosen_seen_made_saved_and_deleted(place, filled_service)
 
 
 def test_wrong_settings_are_told_and_no_film_makes_no_data_set(place):
-    place.get_by_role("textbox", name="How many").fill("9, 3")
-    place.get_by_role("textbox", name="How many").press("Enter")
+    place.get_by_role("textbox", name="Animals in a flock").fill("9, 3")
+    place.get_by_role("textbox", name="Animals in a flock").press("Enter")
     place.get_by_role("button", name="Make the data set").click()
     expect(place.get_by_role("alert")).to_contain_text("the smaller first", timeout=LOAD_MS)
     for film in place.locator(".data-film input").all():

@@ -6,6 +6,7 @@ import { expect } from "../app/jobs.js";
 import { count, say, size } from "../app/words.js";
 import { problemBox } from "../parts/problem.js";
 import { control } from "../studio/control.js";
+import { seed } from "../studio/own-controls.js";
 import { loadFields } from "../studio/schema.js";
 import { filmChoice } from "./films.js";
 import { checks } from "./checks.js";
@@ -24,6 +25,9 @@ export async function datasetForm({ libraries, chosen, life }) {
   const controlOf = (/** @type {string} */ name) => {
     const field = /** @type {import("../studio/schema.js").Field} */ (fields.get(name));
     if (name === "presets") return checks({ ...field, choices: flock.get("preset")?.choices ?? [] }, "preset", { change, fields });
+    if (name === "seed") return seed(field, { change, fields });
+    // Of a flock, it is one number.
+    if (name === "count") return control({ ...field, words: "counts" }, { change, fields });
     return name === "formats" ? checks(field, "label", { change, fields }) : control(field, { change, fields });
   };
   const known = (/** @type {string[]} */ names) => names.filter((name) => fields.has(name)).map(controlOf);

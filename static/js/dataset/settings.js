@@ -3,7 +3,7 @@
 import { bodyOf as bodyOfChanges } from "../studio/settings.js";
 
 /** Settings in sight, those of the scene and those of the camera. A setting of the service that is not here keeps its default. */
-export const MAIN = ["flocks", "pictures", "every", "count", "presets", "formats", "picture", "seed"];
+export const MAIN = ["flocks", "pictures", "every", "count", "picture", "seed", "presets", "formats"];
 export const SCENE = ["backgrounds.plate", "backgrounds.color", "haze_per_bl", "shadow", "scale", "size_px"];
 export const CAMERA = ["gain", "color_gain", "blur_px", "noise", "jpeg_quality", "split"];
 

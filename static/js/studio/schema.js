@@ -6,7 +6,7 @@ import { proseLimits } from "./limits.js";
 
 /**
  * @typedef {{name: string, kind: "number" | "whole" | "boolean" | "choice" | "numbers" | "group" | "other", min: number, max: number,
- *   step: number, choices: string[], default: any, nullable: boolean, help: string}} Field
+ *   step: number, choices: string[], default: any, nullable: boolean, help: string, words?: string}} Field words: name of its words, if they are not its own
  * @typedef {Api.JsonSchema} Schema
  * @typedef {Map<string, Field>} Fields by name, with dots between levels
  */

@@ -72,7 +72,7 @@ async fn archive_has_every_file_of_the_manifest_and_can_be_read_in_ranges() {
     let request = request(&library, 3);
     let ask = app.post("/v1/datasets/preview").json(&request).send();
     let sheet = ask.await.unwrap();
-    assert_eq!(sheet.headers()["content-type"], "image/png");
+    assert_eq!(sheet.headers()["content-type"], "image/jpeg");
     let ask = app.post("/v1/datasets/estimate").json(&request).send();
     let estimate = json_of(ask.await.unwrap(), StatusCode::OK).await;
     assert_eq!(estimate["pictures"], 9);
@@ -87,7 +87,7 @@ async fn archive_has_every_file_of_the_manifest_and_can_be_read_in_ranges() {
     let names: Vec<_> = names.map(|file| file["name"].as_str().unwrap()).collect();
     assert_eq!(
         names,
-        ["dataset.zip", "README.md", "manifest.json", "sheet.png"]
+        ["dataset.zip", "README.md", "manifest.json", "sheet.jpg"]
     );
     let zip = format!("{path}/dataset.zip");
     let archive = file(&app, &zip).await;
@@ -153,10 +153,7 @@ async fn cancelled_data_set_goes_on_with_the_next_flock() {
     assert_eq!(app.delete(&path).send().await.unwrap().status(), 202);
     assert!(matches!(running.await.unwrap(), Step::Cancelled(_)));
     let before = kept_when(&app, &job, 2).await;
-    assert!(
-        before.len() < 6,
-        "the job was done before it was cancelled"
-    );
+    assert!(before.len() < 6, "the job was done before it was cancelled");
     let retry = app.post(&format!("{path}/retry")).send().await.unwrap();
     assert_eq!(retry.status(), StatusCode::ACCEPTED);
     step(&app).await;

@@ -138,7 +138,7 @@ pub(in crate::api) async fn estimate_dataset(
 /// The largest `count` times the frames of a flock is at most 200,000, else the call fails with `invalid_params`. If it
 /// cannot start within 20 seconds, it fails with `busy`.
 #[utoipa::path(post, path = "/v1/datasets/preview", request_body = DatasetRequest, responses(
-    (status = 200, body = Vec<u8>, content_type = "image/png"),
+    (status = 200, body = Vec<u8>, content_type = "image/jpeg"),
     (status = "4XX", body = ProblemBody, content_type = "application/problem+json"),
     (status = "5XX", body = ProblemBody, content_type = "application/problem+json"),
 ))]
@@ -158,7 +158,7 @@ pub(in crate::api) async fn preview_dataset(
     }
     let (context, owner) = (&access.state.context, &access.caller.account.owner);
     let sheet = ahead::sheet(context, owner, &libraries, params).await?;
-    Ok(([(header::CONTENT_TYPE, "image/png")], sheet).into_response())
+    Ok(([(header::CONTENT_TYPE, "image/jpeg")], sheet).into_response())
 }
 
 impl Asked {

@@ -30,7 +30,7 @@ const FILES: Files = &[
     (ARCHIVE, "application/zip"),
     (MANIFEST, "application/json"),
     ("README.md", "text/markdown; charset=utf-8"),
-    (SHEET, "image/png"),
+    (SHEET, "image/jpeg"),
 ];
 
 /// Summary of a data set.
@@ -132,7 +132,7 @@ pub(in crate::api) async fn delete_dataset(
 /// - `dataset.zip`: pictures, labels, manifest and README, for training
 /// - `manifest.json`: what the data set was made from, what each flock shows, and the SHA-256 of every file
 /// - `README.md`: data card, which says what the data set shows and what the labels mean
-/// - `sheet.png`: nine samples with the labels drawn over them
+/// - `sheet.jpg`: nine samples with the labels drawn over them
 ///
 /// Range and conditional requests are supported, so an interrupted download can go on.
 #[utoipa::path(get, path = "/v1/datasets/{id}/{file}",

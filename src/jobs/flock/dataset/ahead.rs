@@ -1,5 +1,6 @@
 //! What is told before a data set is made, while a client waits: its estimated size, and a sheet of samples.
 
+use super::job::SHEET_QUALITY;
 use super::{Dataset, Estimate};
 use crate::jobs::synchronous::compute;
 use crate::jobs::{Context, Error};
@@ -22,7 +23,7 @@ pub async fn estimate(
     .await
 }
 
-/// Returns the sheet of samples of a data set, PNG.
+/// Returns the sheet of samples of a data set, JPEG.
 pub async fn sheet(
     context: &Context,
     owner: &Owner,
@@ -31,7 +32,7 @@ pub async fn sheet(
 ) -> Result<Vec<u8>, Error> {
     compute(context, owner, libraries, |stored, _, cancellation| {
         let sheet = dataset(params, stored)?.sheet(cancellation)?;
-        Ok(picture::write_rgb(&sheet))
+        Ok(picture::write_jpeg_of(&sheet, SHEET_QUALITY))
     })
     .await
 }

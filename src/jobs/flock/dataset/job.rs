@@ -1,6 +1,6 @@
 //! The data set job (docs/explanation/algorithms.md, "Data sets"). Each finished flock is kept as a part, so another attempt
 //! draws at most the flock again that the last one was drawing. The files in the folder of the result are `manifest.json`,
-//! `README.md`, `sheet.png` and the last piece of the archive; the other pieces are in the parts.
+//! `README.md`, `sheet.jpg` and the last piece of the archive; the other pieces are in the parts.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -26,7 +26,9 @@ use flockreel_core::progress::Progress;
 /// Stages with their share of the running time. Drawing takes almost all of it.
 pub const STAGES: Stages = &[("loading", 0.02), ("drawing", 0.95), ("joining", 0.03)];
 /// Name of the sheet of samples.
-pub const SHEET: &str = "sheet.png";
+pub const SHEET: &str = "sheet.jpg";
+/// Quality of the sheet as JPEG. Free choice: outlines of one pixel stay clear.
+pub(super) const SHEET_QUALITY: u8 = 90;
 /// Area of a picture for the estimate of the cost, if the library does not exist yet, pixels. Free choice.
 const PICTURE_PX: f64 = 1e6;
 
@@ -112,7 +114,8 @@ impl JobInput for Input {
         attempt.reporter.report("joining", 0.0);
         work.finish(manifest)?;
         let sheet = dataset.sheet(attempt.reporter)?;
-        fs::write(attempt.folder().join(SHEET), picture::write_rgb(&sheet))?;
+        let sheet = picture::write_jpeg_of(&sheet, SHEET_QUALITY);
+        fs::write(attempt.folder().join(SHEET), sheet)?;
         let summary = Summary {
             library_ids: self.library_ids.clone(),
             flocks: self.params.flocks,
