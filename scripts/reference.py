@@ -124,7 +124,8 @@ def parameter_rows(schemas, schema, prefix=""):
         whole = resolved(schemas, inner)
         items = resolved(schemas, whole.get("items", {}))
         below = [one for one in (whole, *whole.get("oneOf", []), items, *items.get("oneOf", [])) if "properties" in one]
-        default = "required" if name in schema.get("required", []) else f"`{json.dumps(field['default'])}`"
+        # The document tells no default of a free object, which is empty.
+        default = "required" if name in schema.get("required", []) else f"`{json.dumps(field.get('default', {}))}`"
         prose = " ".join(inner.get("description", whole.get("description", "")).split())
         if whole.get("type") != "object" or "oneOf" in field or not below:
             rows.append([f"`{prefix}{name}`", default, values(whole, items), prose])

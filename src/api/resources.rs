@@ -1,4 +1,4 @@
-//! Requests that are the same for footage, libraries, flocks and virtual fish: find, list, get and delete. Also
+//! Requests that are the same for footage, libraries, flocks, virtual fish and data sets: find, list, get and delete. Also
 //! the references to footage and libraries in requests.
 
 use axum::http::StatusCode;
@@ -44,7 +44,7 @@ pub(super) trait ResultView: View {
     fn with_files(self, files: Vec<FileView>) -> Self;
 }
 
-/// New properties of a flock or virtual fish.
+/// New properties of a flock, a virtual fish or a data set.
 #[derive(Clone, Copy, Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ResultChange {

@@ -80,9 +80,7 @@ fn example(path: &str) -> Option<(HttpMethod, Value)> {
         "/v1/flocks/{id}/links" => post(json!({"file": "video.mp4", "expires_s": 3600})),
         "/v1/footage/{id}" => Some((HttpMethod::Patch, json!({"name": "zebra finch.mp4"}))),
         "/v1/libraries/{id}" => Some((HttpMethod::Patch, json!({"px_per_cm": 42}))),
-        "/v1/flocks/{id}" | "/v1/datasets/{id}" => {
-            Some((HttpMethod::Patch, json!({"pinned": true})))
-        }
+        "/v1/flocks/{id}" => Some((HttpMethod::Patch, json!({"pinned": true}))),
         _ => None,
     }
 }

@@ -43,7 +43,7 @@ pub struct Params {
     #[schema(min_items = 1, max_items = 16)]
     pub presets: Vec<String>,
     /// Parameters that all flocks share, as those of a flock: `{"depth_bl": 4, "rules": {"wander": 1}}`.
-    #[schema(value_type = Object, default = json!({}))]
+    #[schema(value_type = Object)]
     pub flock: Map<String, Value>,
     /// Width and height of all pictures, pixels. null = the size of the footage times `scale`.
     #[schema(min_items = 2, max_items = 2)]

@@ -5,11 +5,11 @@
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::dice::{Choice, Dice};
 use super::{Look, Params};
 use crate::flock;
 use crate::flock::composite::params::Background;
 use crate::formats::params::{self, Error};
-use crate::random;
 
 /// All flocks of a data set.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,34 +72,6 @@ pub enum Ground {
     FromParams,
     /// The given picture with this index.
     Picture(usize),
-}
-
-/// Value of a flock that is drawn at random. Each has random numbers of its own.
-#[derive(Clone, Copy)]
-enum Choice {
-    Split,
-    Library,
-    Seed,
-    Count,
-    Preset,
-    Scale,
-    Background,
-    Picture,
-    Color,
-    Haze,
-    Shadow,
-    Gain,
-    Blur,
-    Noise,
-    Quality,
-    NoiseSeed,
-}
-
-/// Draws the random numbers of one flock.
-#[derive(Clone, Copy)]
-struct Dice {
-    seed: u64,
-    number: u32,
 }
 
 impl Plan {
@@ -276,37 +248,6 @@ fn look(params: &Params, dice: &Dice) -> Look {
         noise: dice.uniform(Choice::Noise, params.noise),
         jpeg_quality: dice.whole(Choice::Quality, quality) as u8,
         seed: dice.bits(Choice::NoiseSeed, 0),
-    }
-}
-
-impl Dice {
-    fn bits(self, choice: Choice, k: u64) -> u64 {
-        random::bits(self.seed, &[u64::from(self.number), choice as u64, k])
-    }
-
-    /// Returns a number in [0, 1).
-    fn share(self, choice: Choice, k: u64) -> f64 {
-        random::uniform(self.seed, &[u64::from(self.number), choice as u64, k])
-    }
-
-    fn uniform(self, choice: Choice, [low, high]: [f64; 2]) -> f64 {
-        low + (high - low) * self.share(choice, 0)
-    }
-
-    /// Returns a whole number of a range, its ends included.
-    fn whole(self, choice: Choice, [low, high]: [f64; 2]) -> u32 {
-        (low + (high - low + 1.0) * self.share(choice, 0))
-            .floor()
-            .min(high) as u32
-    }
-
-    /// Returns a factor of a range, uniform in its logarithm.
-    fn factor(self, choice: Choice, k: u64, [low, high]: [f64; 2]) -> f64 {
-        low * libm::pow(high / low, self.share(choice, k))
-    }
-
-    fn pick(self, choice: Choice, n: usize) -> usize {
-        (self.bits(choice, 0) % n as u64) as usize
     }
 }
 
