@@ -142,12 +142,13 @@ def values(schema, items):
     """Returns the limits or names that a schema allows, in words."""
     if names := schema.get("enum"):
         return codes(names)
-    if items and "minItems" in schema:
+    if items.get("type") in ("number", "integer") and "minItems" in schema:
         each = f", each {values(items, {})}" if "minimum" in items else ""
         return f"{schema['minItems']} numbers{each}"
     if items:
         most = f", at most {schema['maxItems']}" if "maxItems" in schema else ""
-        return f"list of {values(items, {})}{most}".replace("object", "objects")
+        of = "texts" if items == {"type": "string"} else values(items, {}).replace("object", "objects")
+        return f"list of {of}{most}"
     if pattern := schema.get("pattern"):
         return f"`{pattern}`"
     if "exclusiveMinimum" in schema:

@@ -233,18 +233,7 @@ fn table() -> OpenApiRouter<AppState> {
             fish::delete_fish
         ))
         .routes(routes!(fish::get_fish_file))
-        .routes(routes!(
-            datasets::create::create_dataset,
-            datasets::list_datasets
-        ))
-        .routes(routes!(datasets::create::estimate_dataset))
-        .routes(routes!(datasets::create::preview_dataset))
-        .routes(routes!(
-            datasets::get_dataset,
-            datasets::change_dataset,
-            datasets::delete_dataset
-        ))
-        .routes(routes!(datasets::get_dataset_file))
+        .merge(datasets::table())
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
         .routes(routes!(jobs::retry::retry_job))

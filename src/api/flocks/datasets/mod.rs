@@ -1,14 +1,17 @@
 //! Data sets: their JSON, and reading and deleting them with their files. The archive is not stored as one file: its pieces
 //! are sent one after the other.
 
-pub(in crate::api) mod create; // JSON -> queued job, estimate or samples
+mod create; // JSON -> queued job, estimate or samples
 
 use axum::http::StatusCode;
 use serde::Serialize;
 use serde_json::Value;
 use utoipa::ToSchema;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
 use uuid::Uuid;
 
+use crate::api::AppState;
 use crate::api::download::names::{saved_as, stem};
 use crate::api::download::{Files, Piece, Sent, find as find_file};
 use crate::api::extract::{Access, Conditions, FileOf, Id, Json};
@@ -32,6 +35,16 @@ const FILES: Files = &[
     ("README.md", "text/markdown; charset=utf-8"),
     (SHEET, "image/jpeg"),
 ];
+
+/// Returns the routes of data sets.
+pub(in crate::api) fn table() -> OpenApiRouter<AppState> {
+    OpenApiRouter::new()
+        .routes(routes!(create::create_dataset, list_datasets))
+        .routes(routes!(create::estimate_dataset))
+        .routes(routes!(create::preview_dataset))
+        .routes(routes!(get_dataset, change_dataset, delete_dataset))
+        .routes(routes!(get_dataset_file))
+}
 
 /// Summary of a data set.
 #[derive(Debug, Serialize, ToSchema)]
