@@ -1,4 +1,4 @@
-//! Computations during a request: a planned flock without its video, all distances of a library as numbers, and its
+//! Computations during a request: a planned flock without its video, samples of a data set, all distances of a library as numbers, and its
 //! motion in centimetres. They queue no job and store no result. The computation is cancelled if the client disconnects.
 
 use std::fs::File;
