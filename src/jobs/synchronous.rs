@@ -1,5 +1,6 @@
-//! Computations during a request: a planned flock without its video, samples of a data set, all distances of a library as numbers, and its
-//! motion in centimetres. They queue no job and store no result. The computation is cancelled if the client disconnects.
+//! Computations during a request: a planned flock without its video, samples of a data set, all distances of a library as
+//! numbers, and its motion in centimetres. They queue no job and store no result. The computation is cancelled if the client
+//! disconnects.
 
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
