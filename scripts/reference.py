@@ -25,7 +25,8 @@ NOTE = "`scripts/reference.py` writes this page from the texts of the program. C
 ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("FLOCKREEL_")}
 # Nouns with parameters: command, schema of the parameters, and schema of a request, which has the presets.
 NOUNS = [("an analysis", "analyze", "AnalysisParams", "AnalysisOverrides"),
-         ("a flock", "flock", "FlockParams", "FlockOverrides"), ("a virtual fish", "fish", "FishParams", "FishRequest")]
+         ("a flock", "flock", "FlockParams", "FlockOverrides"), ("a virtual fish", "fish", "FishParams", "FishRequest"),
+         ("a data set", "dataset", "DatasetParams", "DatasetRequest")]
 DEFAULTS = {"FLOCKREEL_WORKERS": "half of the cores, at least 1, plus one"}  # those that depend on the machine
 
 
@@ -108,10 +109,10 @@ def settings(root, document):
 
 def parameters(schemas, noun, command, name, request):
     """Returns the section about the parameters of a noun, whose schema has this name."""
-    presets = [preset for preset in schemas[request]["properties"]["preset"]["enum"] if preset]
+    presets = [preset for preset in schemas[request]["properties"].get("preset", {"enum": []})["enum"] if preset]
     text = f"\n## Parameters of {noun}\n\nThe API takes them by name, and `flockreel {command} --set NAME=JSON` as well. "
     text += "`a.b` is the field `b` of the object `a`, and `[]` stands for each entry of a list.\n"
-    text += f"Presets: {codes(presets)}.\n"
+    text += f"Presets: {codes(presets)}.\n" if presets else ""
     return text + table(["parameter", "default", "values", "meaning"], *parameter_rows(schemas, schemas[name]))
 
 
@@ -123,9 +124,10 @@ def parameter_rows(schemas, schema, prefix=""):
         whole = resolved(schemas, inner)
         items = resolved(schemas, whole.get("items", {}))
         below = [one for one in (whole, *whole.get("oneOf", []), items, *items.get("oneOf", [])) if "properties" in one]
-        default = "required" if name in schema.get("required", []) else f"`{json.dumps(field['default'])}`"
+        # The document tells no default of a free object, which is empty.
+        default = "required" if name in schema.get("required", []) else f"`{json.dumps(field.get('default', {}))}`"
         prose = " ".join(inner.get("description", whole.get("description", "")).split())
-        if whole.get("type") != "object" or "oneOf" in field:
+        if whole.get("type") != "object" or "oneOf" in field or not below:
             rows.append([f"`{prefix}{name}`", default, values(whole, items), prose])
         for one in below:
             rows += parameter_rows(schemas, one, f"{prefix}{name}[]." if items else f"{prefix}{name}.")
@@ -140,12 +142,13 @@ def values(schema, items):
     """Returns the limits or names that a schema allows, in words."""
     if names := schema.get("enum"):
         return codes(names)
-    if items and "minItems" in schema:
+    if items.get("type") in ("number", "integer") and "minItems" in schema:
         each = f", each {values(items, {})}" if "minimum" in items else ""
         return f"{schema['minItems']} numbers{each}"
     if items:
         most = f", at most {schema['maxItems']}" if "maxItems" in schema else ""
-        return f"list of {values(items, {})}{most}".replace("object", "objects")
+        of = "texts" if items == {"type": "string"} else values(items, {}).replace("object", "objects")
+        return f"list of {of}{most}"
     if pattern := schema.get("pattern"):
         return f"`{pattern}`"
     if "exclusiveMinimum" in schema:

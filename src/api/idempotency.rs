@@ -32,11 +32,12 @@ use crate::store::idempotency::{Answer, Begun, LEASE_MS, Scope};
 use flockreel_core::code::Code;
 
 /// Routes that create something and accept a key.
-pub(super) const ROUTES: [&str; 5] = [
+pub(super) const ROUTES: [&str; 6] = [
     "/v1/footage",
     "/v1/analyses",
     "/v1/flocks",
     "/v1/fish",
+    "/v1/datasets",
     "/v1/uploads",
 ];
 /// Name of the header with the key.

@@ -47,6 +47,7 @@ pub use problem::Problem;
 
 use download::compression;
 use download::if_match::check_if_match;
+use flocks::datasets;
 
 use access::{HostNames, OpenRequests, Rates, authenticate, guard, session};
 use monitoring::metrics::Metrics;
@@ -234,6 +235,7 @@ fn table() -> OpenApiRouter<AppState> {
             fish::delete_fish
         ))
         .routes(routes!(fish::get_fish_file))
+        .merge(datasets::table())
         .routes(routes!(jobs::list_jobs))
         .routes(routes!(jobs::get_job, jobs::cancel_job))
         .routes(routes!(jobs::retry::retry_job))

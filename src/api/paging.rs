@@ -63,7 +63,7 @@ pub(super) struct LibraryQuery {
     q: Option<String>,
 }
 
-/// Query parameters of the lists of flocks and virtual fish.
+/// Query parameters of the lists of flocks, virtual fish and data sets.
 #[derive(Clone, Debug, Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]

@@ -1,4 +1,4 @@
-//! Requests that are the same for footage, libraries, flocks and virtual fish: find, list, get and delete. Also
+//! Requests that are the same for footage, libraries, flocks, virtual fish and data sets: find, list, get and delete. Also
 //! the references to footage and libraries in requests.
 
 use axum::http::StatusCode;
@@ -13,7 +13,6 @@ use super::jobs::absent_result;
 use super::paging::{Listing, Page};
 use super::problem::{JsonAnswer, Problem};
 use crate::jobs::clock::now_ms;
-use crate::store::BlobFile;
 use crate::store::resources::{Property, Resource, ResourceFilter, ResourceKind};
 use flockreel_core::code::Code;
 
@@ -45,7 +44,7 @@ pub(super) trait ResultView: View {
     fn with_files(self, files: Vec<FileView>) -> Self;
 }
 
-/// New properties of a flock or virtual fish.
+/// New properties of a flock, a virtual fish or a data set.
 #[derive(Clone, Copy, Debug, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ResultChange {
@@ -69,6 +68,17 @@ pub(super) struct FileView {
     media_type: &'static str,
     /// Size, bytes.
     size_bytes: i64,
+}
+
+impl FileView {
+    /// Returns the entry of a file with this name, media type and size.
+    pub(super) fn new((name, media_type): (&str, &'static str), size_bytes: i64) -> FileView {
+        FileView {
+            name: name.to_owned(),
+            media_type,
+            size_bytes,
+        }
+    }
 }
 
 /// Reference to a resource in a request: its id, or the word `sample` for the newest sample.
@@ -150,15 +160,8 @@ impl Access {
             stored.extend(self.store().files_of(folder).await?);
         }
         let files = stored.into_iter().filter_map(|file| {
-            let BlobFile {
-                name, size_bytes, ..
-            } = file;
-            let (_, media_type) = V::FILES.iter().find(|(known, _)| *known == name)?;
-            Some(FileView {
-                name,
-                media_type,
-                size_bytes,
-            })
+            let entry = V::FILES.iter().find(|(known, _)| *known == file.name);
+            Some(FileView::new(*entry?, file.size_bytes))
         });
         let files = files.collect();
         Ok(axum::Json(V::from_row(row)?.with_files(files)))

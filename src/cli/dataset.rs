@@ -10,7 +10,7 @@ use super::{Error, Listener, Summary, set};
 use crate::jobs::flock::dataset::folder::FolderError;
 use crate::jobs::flock::dataset::manifest::{LibraryHash, Manifest, library_sha256, sha256_of};
 use crate::jobs::flock::dataset::{Dataset, Estimate, MakeError};
-use flockreel_core::dataset::{Params, Plan};
+use flockreel_core::dataset::Params;
 use flockreel_core::formats::{params, picture};
 use flockreel_core::library::Library;
 
@@ -135,17 +135,8 @@ pub fn run(args: Args) -> Result<Option<Summary>, Error> {
     if let Some(given) = given.as_ref().filter(|given| given.request() != manifest) {
         return Err(Error::Usage(difference(given, &manifest)));
     }
-    let sizes_px: Vec<[u32; 2]> = (libraries.iter())
-        .map(|library| library.poses.image_size_px)
-        .collect();
-    let plan = Plan::new(&params, &sizes_px, backgrounds.len())
+    let dataset = Dataset::new(params, libraries, backgrounds)
         .map_err(|error| Error::Usage(error.to_string()))?;
-    let dataset = Dataset {
-        params,
-        plan,
-        libraries,
-        backgrounds,
-    };
     let progress = Listener::new();
     if let Some(path) = &args.sheet {
         let sheet = dataset.sheet(&progress).map_err(refused)?;

@@ -44,8 +44,8 @@ impl JobInput for Input {
     const KIND: Kind = Kind::Fish;
     type ResultId = FishId;
 
-    fn subject(&self) -> Option<Subject> {
-        Some(Subject::Library(self.library_id))
+    fn subjects(&self) -> Vec<Subject> {
+        vec![Subject::Library(self.library_id)]
     }
 
     fn cost_px(&self, library: Option<Extent>) -> Option<f64> {

@@ -18,8 +18,8 @@ impl Context {
         &self,
         input: &Input,
     ) -> Result<bool, store::Error> {
-        let extent = match input.subject() {
-            Some(subject) => self.extent_of(subject).await?,
+        let extent = match input.subjects().first() {
+            Some(subject) => self.extent_of(*subject).await?,
             None => None,
         };
         let cost_px = input.cost_px(extent);

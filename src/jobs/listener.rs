@@ -30,6 +30,8 @@ pub struct Listener {
 #[derive(Debug)]
 struct State {
     position: Position,
+    /// Time at which the last part of the result was kept.
+    advanced: Option<Instant>,
     times: Times,
 }
 
@@ -50,6 +52,7 @@ impl Listener {
                 stage: "starting",
                 progress: 0.0,
             },
+            advanced: None,
             times: Times {
                 past: Vec::new(),
                 since: Instant::now(),
@@ -98,6 +101,16 @@ impl Listener {
     /// Returns the position of the computation.
     pub fn position(&self) -> Position {
         self.state().position
+    }
+
+    /// Takes note that a part of the result was kept, which no later attempt makes again.
+    pub fn note_advance(&self) {
+        self.state().advanced = Some(Instant::now());
+    }
+
+    /// Returns when the last part of the result was kept; `None` if none was.
+    pub fn advanced_at(&self) -> Option<Instant> {
+        self.state().advanced
     }
 
     /// Returns the time spent in each stage so far. Only the stages of the job are included.

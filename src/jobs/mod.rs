@@ -48,6 +48,7 @@ pub use id_sequence::IdSequence;
 pub use listener::{Listener, Stages};
 pub use meters::Meters;
 
+use self::flock::dataset::job as dataset;
 use crate::config::{self, JobSettings, Retention};
 use crate::store::jobs::Kind;
 use crate::store::jobs::enqueue::NewJob;
@@ -239,11 +240,11 @@ pub trait JobInput: Serialize + DeserializeOwned {
     /// Type of the id of the result.
     type ResultId: From<Uuid>;
 
-    /// Returns what the job works on, if anything.
-    fn subject(&self) -> Option<Subject>;
+    /// Returns what the job works on: nothing, a footage, a library, or several libraries.
+    fn subjects(&self) -> Vec<Subject>;
 
     /// Estimates the cost of the job: the number of pixels that are decoded, drawn and encoded. `None` if that depends
-    /// on an unknown subject. `subject` is the extent of the footage, or of that of the library.
+    /// on an unknown subject. `subject` is the extent of the footage, or of that of the (first) library.
     fn cost_px(&self, subject: Option<Extent>) -> Option<f64>;
 
     /// Makes the result in the process of an attempt, and leaves its files in the folder of the attempt.
@@ -258,17 +259,19 @@ fn run(kind: Kind, input: &str, attempt: &Attempt) -> Result<Product, Error> {
         Kind::Views => parse::<views::Input>(input)?.run(attempt),
         Kind::Flock => parse::<flock::Input>(input)?.run(attempt),
         Kind::Fish => parse::<fish::Input>(input)?.run(attempt),
+        Kind::Dataset => parse::<dataset::Input>(input)?.run(attempt),
     }
 }
 
-/// Returns what a job of this kind with this input (JSON) works on, if anything.
-fn subject(kind: Kind, input: &str) -> Result<Option<Subject>, Error> {
+/// Returns what a job of this kind with this input (JSON) works on.
+fn subjects(kind: Kind, input: &str) -> Result<Vec<Subject>, Error> {
     Ok(match kind {
-        Kind::Sample => parse::<sample::Input>(input)?.subject(),
-        Kind::Analysis => parse::<analysis::Input>(input)?.subject(),
-        Kind::Views => parse::<views::Input>(input)?.subject(),
-        Kind::Flock => parse::<flock::Input>(input)?.subject(),
-        Kind::Fish => parse::<fish::Input>(input)?.subject(),
+        Kind::Sample => parse::<sample::Input>(input)?.subjects(),
+        Kind::Analysis => parse::<analysis::Input>(input)?.subjects(),
+        Kind::Views => parse::<views::Input>(input)?.subjects(),
+        Kind::Flock => parse::<flock::Input>(input)?.subjects(),
+        Kind::Fish => parse::<fish::Input>(input)?.subjects(),
+        Kind::Dataset => parse::<dataset::Input>(input)?.subjects(),
     })
 }
 
@@ -284,5 +287,6 @@ pub fn stages(kind: Kind) -> Stages {
         Kind::Views => views::STAGES,
         Kind::Flock => flock::STAGES,
         Kind::Fish => fish::STAGES,
+        Kind::Dataset => dataset::STAGES,
     }
 }

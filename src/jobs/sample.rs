@@ -74,8 +74,8 @@ impl JobInput for Input {
     const KIND: Kind = Kind::Sample;
     type ResultId = FootageId;
 
-    fn subject(&self) -> Option<Subject> {
-        None
+    fn subjects(&self) -> Vec<Subject> {
+        Vec::new()
     }
 
     fn cost_px(&self, _: Option<Extent>) -> Option<f64> {

@@ -1,8 +1,10 @@
-//! Computations during a request: a planned flock without its video, a flock as a 3-D model, all distances of a library
-//! as numbers, and its motion in centimetres. They queue no job and store no result. The computation is cancelled if the client disconnects.
+//! Computations during a request: a planned flock without its video, a flock as a 3-D model, samples of a data set, all
+//! distances of a library as numbers, and its motion in centimetres. They queue no job and store no result. The computation
+//! is cancelled if the client disconnects.
 
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
+use std::slice::from_ref;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -43,9 +45,9 @@ pub async fn preview_flock(
     params: Params,
     write: fn(&Flock) -> Vec<u8>,
 ) -> Result<Preview, Error> {
-    let plan = move |stored: StoredLibrary, _: &Draft, cancellation: &Cancellation| {
+    let plan = move |stored: Vec<StoredLibrary>, _: &Draft, cancellation: &Cancellation| {
         let start = Instant::now();
-        let flock = plan_flock(&stored.library, &params, cancellation)?;
+        let flock = plan_flock(&stored[0].library, &params, cancellation)?;
         let planning = start.elapsed();
         let file = write(&flock);
         let writing = start.elapsed() - planning;
@@ -55,7 +57,7 @@ pub async fn preview_flock(
             writing,
         })
     };
-    compute(context, owner, library, plan).await
+    compute(context, owner, from_ref(library), plan).await
 }
 
 /// Computes the distances between all clips of a library. Returns an unnamed file with the `distance.npy`.
@@ -64,15 +66,17 @@ pub async fn distance_file(
     owner: &Owner,
     library: &Library,
 ) -> Result<File, Error> {
-    let write = |stored: StoredLibrary, draft: &Draft, cancellation: &Cancellation| {
-        let library = stored.library;
+    let write = |stored: Vec<StoredLibrary>, draft: &Draft, cancellation: &Cancellation| {
+        let StoredLibrary {
+            library, params, ..
+        } = &stored[0];
         npy::check(library.sprites.n_frames())?;
-        let planes = stored.params.planes;
+        let planes = params.planes;
         let pixels = ComparedSprites::new(&library.sprites, &library.poses, planes);
         let pixels = pixels.map_err(flockreel_core::analysis::Error::Full)?;
         let distances = Distances {
             pixels: &pixels,
-            clip: stored.params.clip(library.clip_frames),
+            clip: params.clip(library.clip_frames),
             side: Side::Plain,
             cpu: Level::detect(),
         };
@@ -88,7 +92,7 @@ pub async fn distance_file(
             .into_inner()
             .map_err(std::io::IntoInnerError::into_error)?)
     };
-    compute(context, owner, library, write).await
+    compute(context, owner, from_ref(library), write).await
 }
 
 /// Makes the school of a flock: a GLB file with a virtual animal for each individual.
@@ -100,18 +104,18 @@ pub async fn school(
     params: fish::Params,
 ) -> Result<Vec<u8>, Error> {
     let files = context.store.fetch(flock_folder, &[FLOCK]).await?;
-    let write = move |stored: StoredLibrary, _: &Draft, _: &Cancellation| {
-        let library = stored.library;
+    let write = move |stored: Vec<StoredLibrary>, _: &Draft, _: &Cancellation| {
+        let library = &stored[0].library;
         let flock = flock_json::read(&std::fs::read(files.path().join(FLOCK))?);
         let flock = flock.map_err(std::io::Error::from)?;
-        if !flock.fits(&library) {
+        if !flock.fits(library) {
             let why = "the stored flock does not fit its library";
             return Err(std::io::Error::other(why).into());
         }
-        let film = fish::Film::of(&library, &params)?;
+        let film = fish::Film::of(library, &params)?;
         Ok(glb::write_school(&flock, library.poses.view, &film))
     };
-    compute(context, owner, library, write).await
+    compute(context, owner, from_ref(library), write).await
 }
 
 /// File with the data of a flock.
@@ -134,17 +138,22 @@ pub async fn from_poses(
     .await
 }
 
-/// Runs a computation on a library for the owner of a request. Waits for the owner's turn; fails with
+/// Runs a computation on libraries, at least one, for the owner of a request. Waits for the owner's turn; fails with
 /// [`Error::Busy`] if it does not come in time.
-async fn compute<Output: Send + 'static>(
+pub(super) async fn compute<Output: Send + 'static>(
     context: &Context,
     owner: &Owner,
-    library: &Library,
-    work: impl FnOnce(StoredLibrary, &Draft, &Cancellation) -> Result<Output, Error> + Send + 'static,
+    libraries: &[Library],
+    work: impl FnOnce(Vec<StoredLibrary>, &Draft, &Cancellation) -> Result<Output, Error>
+    + Send
+    + 'static,
 ) -> Result<Output, Error> {
     let permit = context.synchronous_work.acquire(owner).await?;
     let store = &context.store;
-    let files = store.fetch(&library.folder, &library_dir::FILES).await?;
+    let mut folders = Vec::new();
+    for library in libraries {
+        folders.push(store.fetch(&library.folder, &library_dir::FILES).await?);
+    }
     let draft = store
         .blobs()
         .draft(&format!("synchronous.{}", Uuid::now_v7()))?;
@@ -153,7 +162,10 @@ async fn compute<Output: Send + 'static>(
         let _permit = permit;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.map_err(std::io::Error::other)?.install(|| {
-            let stored = library_dir::read(files.path(), Arc::new(Spill::into(draft.path())))?;
+            let scratch = Arc::new(Spill::into(draft.path()));
+            let stored = (folders.iter())
+                .map(|files| library_dir::read(files.path(), scratch.clone()))
+                .collect::<Result<Vec<_>, _>>()?;
             work(stored, &draft, cancellation)
         })
     })
@@ -172,7 +184,7 @@ async fn run_until_dropped<Output: Send + 'static>(
 }
 
 /// Cancellation of a computation when its request is dropped. Progress is not reported.
-struct Cancellation(CancellationToken);
+pub(super) struct Cancellation(CancellationToken);
 
 impl Progress for Cancellation {
     fn report(&self, _: &'static str, _: f64) {}

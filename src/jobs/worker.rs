@@ -126,7 +126,9 @@ impl Worker {
                 _ = tick.tick() => {}
             }
             if reason.is_none() {
-                reason = self.reason_to_stop(lease, start).await;
+                // A job that keeps parts has the time for each of them.
+                let since = listener.advanced_at().map_or(start, Instant::from_std);
+                reason = self.reason_to_stop(lease, since).await;
             }
             if reason.is_some() || self.context.draining.is_cancelled() {
                 listener.cancel();
@@ -139,13 +141,13 @@ impl Worker {
         }
     }
 
-    /// Returns why a computation that began at `start` must stop, if it must.
-    async fn reason_to_stop(&self, lease: &Lease, start: Instant) -> Option<Error> {
+    /// Returns why a computation must stop, if it must. It began, or kept the last part of its result, at `since`.
+    async fn reason_to_stop(&self, lease: &Lease, since: Instant) -> Option<Error> {
         let lacks_space = self.context.lacks_disk_space();
         if lacks_space {
             return Some(Error::DiskFull);
         }
-        let is_late = start.elapsed() > self.context.budget;
+        let is_late = since.elapsed() > self.context.budget;
         if is_late {
             return Some(Error::TimeLimit);
         }
@@ -202,7 +204,7 @@ impl Worker {
                 tracing::debug!(job.id = %job, %error, "the computation of a job ended as requested");
                 (store.stop(lease, now_ms()).await?, Step::Cancelled(job))
             }
-            Err(error) if let Some((end, n_earlier)) = bad_end(&error, lease) => {
+            Err(error) if let Some((end, n_earlier)) = bad_end(&error, lease, listener) => {
                 tracing::warn!(job.id = %job, %error, n_earlier, "a job ended badly; it is tried again");
                 let run_at_ms = self.context.now_ms().await? + (BACKOFF_MS << (2 * n_earlier));
                 let change = store.requeue(lease, end, run_at_ms).await?;
@@ -262,12 +264,17 @@ fn was_stopped(error: &Error, listener: &Listener) -> bool {
     listener.is_cancelled() && !matches!(error, Error::TimeLimit | Error::DiskFull)
 }
 
-/// Returns how an attempt ended if the job is to be tried again, and the number of earlier ends of this kind.
-fn bad_end(error: &Error, lease: &Lease) -> Option<(End, i64)> {
+/// Returns how an attempt ended if the job is to be tried again, and the number of earlier ends of this kind since the
+/// job last kept a part of its result.
+fn bad_end(error: &Error, lease: &Lease, listener: &Listener) -> Option<(End, i64)> {
     let (end, n_earlier) = match error {
         Error::Crashed(_) => (End::Crash, lease.own_crashes),
         error if error.is_transient() => (End::Transient, lease.transient_ends),
         _ => return None,
+    };
+    let n_earlier = match listener.advanced_at() {
+        Some(_) => 0,
+        None => n_earlier,
     };
     (n_earlier + 1 < MAX_BAD_ENDS).then_some((end, n_earlier))
 }

@@ -129,7 +129,8 @@ const JOB_RULES: &[(&str, &str)] = &[
          + (select count(*) from libraries r where r.job_id = j.id and r.fence = j.fence) \
          + (select count(*) from views r where r.job_id = j.id and r.fence = j.fence) \
          + (select count(*) from flocks r where r.job_id = j.id and r.fence = j.fence) \
-         + (select count(*) from fish r where r.job_id = j.id and r.fence = j.fence))",
+         + (select count(*) from fish r where r.job_id = j.id and r.fence = j.fence) \
+         + (select count(*) from datasets r where r.job_id = j.id and r.fence = j.fence))",
     ),
     (
         "I5: a lease ended more than a minute ago",
@@ -143,7 +144,9 @@ const WRONG_SIZES: &str = "select r.folder from ( \
          select folder, size_bytes from libraries union all \
          select folder, size_bytes from views union all \
          select folder, size_bytes from flocks union all \
-         select folder, size_bytes from fish) r \
+         select folder, size_bytes from fish union all \
+         select folder, size_bytes from datasets union all \
+         select folder, size_bytes from job_parts) r \
          where r.size_bytes != ( \
          select coalesce(sum(b.size_bytes), -1) from blobs b where b.folder = r.folder)";
 

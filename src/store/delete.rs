@@ -9,7 +9,7 @@
 use sqlx::types::Uuid;
 
 use super::jobs::enqueue::QUEUE_LOCK;
-use super::resources::ResourceKind;
+use super::resources::{ResourceKind, is_dataset_of};
 use super::{Error, Store, Transaction, sql};
 
 impl Store {
@@ -40,9 +40,7 @@ impl Store {
             let folders = match kind {
                 ResourceKind::Footage => delete_footage_rows(&mut transaction, id).await?,
                 ResourceKind::Library => delete_library_rows(&mut transaction, id).await?,
-                ResourceKind::Flock | ResourceKind::Fish | ResourceKind::Views => {
-                    delete_film_rows(&mut transaction, id).await?
-                }
+                _ => delete_film_rows(&mut transaction, id).await?,
             };
             for folder in &folders {
                 let delete = sql::query("delete from blobs where folder = $1").bind(folder);
@@ -101,7 +99,10 @@ async fn delete_library_rows(
                select folder from views where library_id = $1 union all \
                select folder from flocks where library_id = $1 union all \
                select folder from fish where library_id = $1";
-    let folders = folders_of(transaction, sql, library).await?;
+    let mut folders = folders_of(transaction, sql, library).await?;
+    for dataset in datasets_of(transaction, library).await? {
+        folders.extend(delete_film_rows(transaction, dataset).await?);
+    }
     for sql in [
         "delete from views where library_id = $1",
         "delete from flocks where library_id = $1",
@@ -118,7 +119,21 @@ async fn delete_library_rows(
     Ok(folders)
 }
 
-/// Deletes the rows of a flock or virtual fish. Returns the folder that they named.
+/// Returns the results of all jobs that make data sets of a library, also of those that have not finished.
+async fn datasets_of(
+    transaction: &mut Transaction,
+    library: Uuid,
+) -> Result<Vec<Uuid>, sqlx::Error> {
+    let is_of = is_dataset_of("$1");
+    let sql = format!("select j.result_id from jobs j where {is_of} for update");
+    sql::query_scalar(sql)
+        .bind(library)
+        .fetch_all(transaction)
+        .await
+}
+
+/// Deletes the rows of a flock, a virtual fish or a data set. Returns the folders that they named, also those of parts
+/// that an unfinished job has kept.
 async fn delete_film_rows(
     transaction: &mut Transaction,
     id: Uuid,
@@ -126,11 +141,15 @@ async fn delete_film_rows(
     let lock = sql::query("select 1 from jobs where result_id = $1 for update").bind(id);
     lock.execute(&mut *transaction).await?;
     let sql = "select folder from flocks where id = $1 union all \
-               select folder from fish where id = $1";
+               select folder from fish where id = $1 union all \
+               select folder from datasets where id = $1 union all \
+               select p.folder from job_parts p join jobs j on j.id = p.job_id where j.result_id = $1";
     let folders = folders_of(transaction, sql, id).await?;
     for sql in [
         "delete from flocks where id = $1",
         "delete from fish where id = $1",
+        "delete from datasets where id = $1",
+        "delete from job_parts where job_id in (select id from jobs where result_id = $1)",
         "delete from jobs where result_id = $1",
     ] {
         sql::query(sql).bind(id).execute(&mut *transaction).await?;

@@ -58,6 +58,8 @@ pub enum ResourceKind {
     Fish,
     /// The videos of a library, the result of a views job. They have no address of their own.
     Views,
+    /// The result of a data set job.
+    Dataset,
 }
 
 /// A kind of resource as a type, for queries that return its rows.
@@ -150,46 +152,44 @@ impl Resource for Library {
     }
 }
 
-/// Flocks. Their rows are [`FilmRow`]s.
-pub struct Flock;
+/// Defines kinds of resources whose rows are [`FilmRow`]s.
+macro_rules! films {
+    ($($(#[$doc:meta])* $name:ident)*) => {$(
+        $(#[$doc])*
+        pub struct $name;
 
-impl Resource for Flock {
-    type Row = FilmRow;
-    const KIND: ResourceKind = ResourceKind::Flock;
+        impl Resource for $name {
+            type Row = FilmRow;
+            const KIND: ResourceKind = ResourceKind::$name;
 
-    fn id(row: &FilmRow) -> Uuid {
-        row.id
-    }
+            fn id(row: &FilmRow) -> Uuid {
+                row.id
+            }
 
-    fn used_ms(row: &FilmRow) -> i64 {
-        row.used_ms
-    }
+            fn used_ms(row: &FilmRow) -> i64 {
+                row.used_ms
+            }
+        }
+    )*};
 }
 
-/// Virtual fish. Their rows are [`FilmRow`]s.
-pub struct Fish;
-
-impl Resource for Fish {
-    type Row = FilmRow;
-    const KIND: ResourceKind = ResourceKind::Fish;
-
-    fn id(row: &FilmRow) -> Uuid {
-        row.id
-    }
-
-    fn used_ms(row: &FilmRow) -> i64 {
-        row.used_ms
-    }
+films! {
+    /// Flocks.
+    Flock
+    /// Virtual fish.
+    Fish
+    /// Data sets.
+    Dataset
 }
 
-/// One stored flock or virtual fish. Its files are in `folder`.
+/// One stored flock, virtual fish or data set. Its files are in `folder`, except the parts of a data set.
 #[derive(Clone, Debug, PartialEq, FromRow)]
 pub struct FilmRow {
-    /// Id of the flock or fish.
+    /// Id of the flock, fish or data set.
     pub id: Uuid,
     /// The job that made it.
     pub job_id: Uuid,
-    /// The library that it was made from.
+    /// The library that it was made from; of a data set, the first one.
     pub library_id: Uuid,
     /// Folder in the blob store.
     pub folder: String,
@@ -213,12 +213,13 @@ pub struct FilmRow {
 
 impl ResourceKind {
     /// All kinds.
-    pub const ALL: [ResourceKind; 5] = [
+    pub const ALL: [ResourceKind; 6] = [
         ResourceKind::Footage,
         ResourceKind::Library,
         ResourceKind::Flock,
         ResourceKind::Fish,
         ResourceKind::Views,
+        ResourceKind::Dataset,
     ];
 
     /// Returns the name of the table, of the folder of the files, and of the routes.
@@ -229,6 +230,7 @@ impl ResourceKind {
             ResourceKind::Flock => "flocks",
             ResourceKind::Fish => "fish",
             ResourceKind::Views => "views",
+            ResourceKind::Dataset => "datasets",
         }
     }
 
@@ -238,6 +240,10 @@ impl ResourceKind {
         match self {
             ResourceKind::Library => {
                 "r.size_bytes + coalesce((select v.size_bytes from views v where v.library_id = r.id), 0)"
+            }
+            ResourceKind::Dataset => {
+                "r.size_bytes + cast(coalesce((select sum(p.size_bytes) from job_parts p \
+                 where p.job_id = r.job_id), 0) as bigint)"
             }
             _ => "r.size_bytes",
         }
@@ -252,6 +258,7 @@ impl ResourceKind {
             ResourceKind::Flock | ResourceKind::Fish | ResourceKind::Views => {
                 ["footage_id", "library_id", "f.name"]
             }
+            ResourceKind::Dataset => return of_any_library(),
         };
         format!(
             "and ($4 is null or {footage_id} = $4) and ($5 is null or {library_id} = $5) \
@@ -272,14 +279,33 @@ impl ResourceKind {
                  left join jobs j on j.after_job = r.job_id and j.kind = 'views'",
                 size = self.size()
             ),
-            ResourceKind::Flock | ResourceKind::Fish | ResourceKind::Views => format!(
+            _ => format!(
                 "select r.id, r.job_id, library_id, r.folder, r.params, r.summary, f.name, sample, \
-                 r.size_bytes, r.pinned, r.used_ms, r.created_ms \
+                 {size} as size_bytes, r.pinned, r.used_ms, r.created_ms \
                  from {table} r join libraries l on l.id = library_id \
-                 join footage f on f.id = footage_id"
+                 join footage f on f.id = footage_id",
+                size = self.size()
             ),
         }
     }
+}
+
+/// Returns the SQL condition that the job with the alias `j` makes a data set of the library with this id.
+pub(super) fn is_dataset_of(library: &str) -> String {
+    format!(
+        "j.kind = 'dataset' and upper(replace(json_extract(j.input, '$.library_ids'), '-', '')) \
+         like '%' || hex({library}) || '%'"
+    )
+}
+
+/// Returns the SQL of a [`ResourceFilter`] for data sets, which are made from several libraries.
+fn of_any_library() -> String {
+    let is_of = is_dataset_of("s.id");
+    format!(
+        "and exists (select 1 from jobs j join libraries s on {is_of} join footage o on o.id = s.footage_id \
+         where j.id = r.job_id and ($4 is null or o.id = $4) and ($5 is null or s.id = $5) \
+         and ($6 is null or lower(o.name) like lower($6) escape '\\')) and (sample or not $7)"
+    )
 }
 
 impl Store {

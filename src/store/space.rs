@@ -74,7 +74,7 @@ pub struct Amount {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Usage {
     /// Stored resources by kind.
-    pub stored: [(ResourceKind, Amount); 5],
+    pub stored: [(ResourceKind, Amount); 6],
     /// Open resumable uploads, with their announced sizes.
     pub uploads: Amount,
     /// Announced size of the bodies of requests that are being received, bytes.
@@ -122,6 +122,18 @@ impl Store {
         self.space.check_owner(used_bytes.unsigned_abs(), 1)
     }
 
+    /// Fails with [`Error::OwnerStorageFull`] or `storage_full` if a result of `n_bytes` would not fit. The files are in a
+    /// bucket or on the disk, which holds only a part of them at a time in the first case.
+    pub async fn require_result_space(&self, owner: &Owner, n_bytes: u64) -> Result<(), Error> {
+        let used_bytes: i64 = owner_bytes(owner, None).fetch_one(&self.reader).await?;
+        let used_bytes = used_bytes.unsigned_abs() + self.space.announced_bytes(owner);
+        self.space.check_owner(used_bytes, n_bytes)?;
+        if self.blobs.are_in_bucket() {
+            return Ok(());
+        }
+        self.check_disk(n_bytes)
+    }
+
     /// Fails with `storage_full` if `n_bytes` more would use the reserve of the disk.
     pub fn check_disk(&self, n_bytes: u64) -> Result<(), Error> {
         self.require_free(n_bytes.saturating_add(self.space.limits.disk_reserve_bytes))
@@ -149,6 +161,9 @@ impl Store {
         let mut stored = ResourceKind::ALL.map(|kind| (kind, Amount::default()));
         for (kind, found) in &mut stored {
             *found = amount(&format!("{} where", kind.plural())).await?;
+            if *kind == ResourceKind::Dataset {
+                found.n_bytes += amount("job_parts where").await?.n_bytes;
+            }
         }
         Ok(Usage {
             stored,
@@ -309,6 +324,7 @@ fn owner_bytes(owner: &Owner, but: Option<Uuid>) -> sql::ScalarQuery {
     });
     let sql = format!(
         "select cast(coalesce(sum(size_bytes), 0) as bigint) from ({}\
+         select size_bytes from job_parts where owner = $1 union all \
          select size_bytes from uploads where owner = $1 and footage_id is null and ($2 is null or id <> $2)) s",
         stored.concat()
     );

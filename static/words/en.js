@@ -19,13 +19,13 @@ export default {
 
   "tray.title": "Jobs", "tray.all": "All jobs", "tray.idle": "Jobs", "tray.busy": "{n} running", "tray.sending": "Sending {n}", "tray.refused": "{n} not accepted", "tray.paused": "{n} interrupted",
   "tray.empty": "Nothing is running.",
-  "job.analysis": "Measuring {film}", "job.views": "Making the videos of {film}", "job.flock": "Making a flock of {film}", "job.fish": "Making the virtual fish of {film}", "job.sample": "Filming a sample",
+  "job.analysis": "Measuring {film}", "job.views": "Making the videos of {film}", "job.flock": "Making a flock of {film}", "job.fish": "Making the virtual fish of {film}", "job.dataset": "Making a data set of {film}", "job.sample": "Filming a sample",
   "job.progress": "Progress", "job.left": "About {time} left.", "job.ahead": { one: "{n} job before this one.", other: "{n} jobs before this one." }, "job.restarted": "Restarted after an interruption (attempt {n}).", "job.open": "Open", "job.download": "Download", "job.again": "Measure again", "job.retry": "Try again", "job.film": "See the film", "job.mend": "What mends it",
   "upload.sending": "Sending", "upload.checking": "Checking", "upload.failed": "Not accepted", "upload.paused": "Interrupted", "upload.choose": "Choose the same file again. The upload continues where it stopped.", "upload.of": "{sent} of {total}",
   "state.queued": "Waiting", "state.running": "Working", "state.done": "Done", "state.failed": "Failed", "state.cancelled": "Cancelled", "state.cancelling": "Stopping",
   "stage.starting": "Starting", "stage.filming": "Filming a virtual goldfish", "stage.background": "Finding the still scene", "stage.tracking": "Following the animal",
   "stage.distances": "Comparing moments", "stage.writing": "Storing the result", "stage.overlay": "Drawing the measurement over the film",
-  "stage.loading": "Opening the library", "stage.simulating": "Simulating the flock", "stage.planning": "Choosing frames for every individual", "stage.rendering": "Drawing the film", "stage.files": "Writing files",
+  "stage.loading": "Opening the library", "stage.simulating": "Simulating the flock", "stage.planning": "Choosing frames for every individual", "stage.rendering": "Drawing the film", "stage.drawing": "Drawing pictures and labels", "stage.joining": "Joining the labels", "stage.files": "Writing files",
 
   "drop.here": "Let go to measure the film", "drop.folder": "This is a folder", "drop.folder.detail": "Drop the films inside it.",
   "film.unnamed": "a film", "film.sample": "virtual goldfish", "film.deleted": "a deleted film", "film.measured": "measured", "film.not_measured": "not measured", "film.measure": "Measure the film",
@@ -255,6 +255,20 @@ export default {
   "shared.over": "This link has expired", "shared.over.help": "It worked until {time}. Ask for a new one.",
   "shared.broken": "This link is not complete", "shared.broken.help": "Copy the whole link, or ask for a new one.",
   "shared.gone": "This link does not work", "shared.gone.help": "The film may have been deleted. Ask for a new link.",
+
+  // Data sets.
+  "data.title": "Data sets", "data.what": "Labelled pictures of many animals, made of the films of one. They train a detector or a tracker without labelling by hand.", "data.new": "A new data set",
+  "data.films": "Films", "data.no_films": "No film is measured yet.", "data.choose": "Choose at least one film.",
+  "data.scene": "Scene: backgrounds, haze, size", "data.camera": "Camera: light, blur, noise; shares of train, val and test",
+  "data.source": "Source of the films, for the README", "data.licence": "License of the films, for the README",
+  "data.see": "See nine samples", "data.make": "Make the data set", "data.drawing": "Drawing samples…", "data.estimating": "Estimating the size…",
+  "data.sheet": "Nine samples with their labels", "data.sheet.what": "Outlines are masks. White points are visible keypoints, red ones are hidden.",
+  "data.size": { one: "{pictures} pictures, about {size}, and about {n} minute of drawing", other: "{pictures} pictures, about {size}, and about {n} minutes of drawing" }, "data.started": "Started: {size}.",
+  "data.of": "{film}, {pictures} pictures", "data.flocks": { one: "{n} flock", other: "{n} flocks" }, "data.save": "Save ZIP", "data.save.of": "Save ZIP: {name}", "data.file.of": "{file} of {name}", "data.sheet.of": "Samples of {name}",
+  "set.flocks": "Flocks", "set.pictures": "Pictures of each flock", "set.every": "Every n-th frame", "set.counts": "Animals in a flock, from–to", "set.presets": "Behaviors", "set.formats": "Labels", "set.picture": "Pictures", "set.picture.jpeg": "JPEG", "set.picture.png": "PNG, without loss",
+  "set.backgrounds.plate": "Weight of the film’s background", "set.backgrounds.color": "Weight of plain colors", "set.haze_per_bl": "Haze, from–to", "set.shadow": "Darkness of shadows, from–to", "set.scale": "Size relative to the film, from–to", "set.size_px": "Width and height (pixels)",
+  "set.gain": "Light, from–to", "set.color_gain": "Each color, from–to", "set.blur_px": "Blur (pixels), from–to", "set.noise": "Noise, from–to", "set.jpeg_quality": "Quality of JPEG, from–to", "set.split": "Shares of train, val and test",
+  "set.label.coco": "COCO: masks, boxes, keypoints", "set.label.mot": "MOTChallenge tracks", "set.label.yolo_detect": "YOLO boxes", "set.label.yolo_segment": "YOLO outlines", "set.label.yolo_pose": "YOLO keypoints", "set.label.dlc": "DeepLabCut", "set.label.tracks": "Tables of tracks", "set.label.masks": "Label pictures", "set.label.depth": "Depth order",
 
   // Virtual fish.
   "fish.title": "Virtual fish: {film}",

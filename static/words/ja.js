@@ -18,13 +18,13 @@ export default {
 
   "tray.title": "ジョブ", "tray.all": "すべてのジョブ", "tray.idle": "ジョブ", "tray.busy": "{n}件実行中", "tray.sending": "{n}件送信中", "tray.refused": "{n}件受付不可", "tray.paused": "{n}件中断",
   "tray.empty": "実行中のジョブはありません。",
-  "job.analysis": "{film}の計測", "job.views": "{film}の動画の準備", "job.flock": "{film}の群れの作成", "job.fish": "{film}のバーチャルフィッシュの作成", "job.sample": "サンプル動画の作成",
+  "job.analysis": "{film}の計測", "job.views": "{film}の動画の準備", "job.flock": "{film}の群れの作成", "job.fish": "{film}のバーチャルフィッシュの作成", "job.dataset": "{film}のデータセットを作成", "job.sample": "サンプル動画の作成",
   "job.progress": "進み具合", "job.left": "残り約{time}です。", "job.ahead": "このジョブより先に{n}件のジョブがあります。", "job.restarted": "中断したため、やり直しています（{n}回目の実行）。", "job.open": "開く", "job.download": "ダウンロード", "job.again": "再計測", "job.retry": "もう一度試す", "job.film": "動画を見る", "job.mend": "解決方法",
   "upload.sending": "送信中", "upload.checking": "確認中", "upload.failed": "受付不可", "upload.paused": "中断", "upload.choose": "同じファイルをもう一度選ぶと、中断したところから送信を再開します。", "upload.of": "{sent} / {total}",
   "state.queued": "待機中", "state.running": "実行中", "state.done": "完了", "state.failed": "失敗", "state.cancelled": "キャンセル済み", "state.cancelling": "キャンセル中",
   "stage.starting": "開始中", "stage.filming": "仮想の金魚を撮影中", "stage.background": "背景を推定中", "stage.tracking": "動物を追跡中",
   "stage.distances": "距離行列を計算中", "stage.writing": "結果を保存中", "stage.overlay": "計測結果を動画に描画中",
-  "stage.loading": "計測結果を読み込み中", "stage.simulating": "群行動を計算中", "stage.planning": "各個体のフレームを選択中", "stage.rendering": "動画を描画中", "stage.files": "ファイルを書き込み中",
+  "stage.loading": "計測結果を読み込み中", "stage.simulating": "群行動を計算中", "stage.planning": "各個体のフレームを選択中", "stage.rendering": "動画を描画中", "stage.drawing": "画像と正解を描画中", "stage.joining": "正解をまとめています", "stage.files": "ファイルを書き込み中",
 
   "drop.here": "ドロップすると計測を始めます", "drop.folder": "フォルダーはドロップできません", "drop.folder.detail": "フォルダーの中の動画をドロップしてください。",
   "film.unnamed": "名前のない動画", "film.sample": "仮想の金魚", "film.deleted": "削除された動画", "film.measured": "計測済み", "film.not_measured": "未計測", "film.measure": "動画を計測",
@@ -254,6 +254,20 @@ export default {
   "shared.over": "リンクの期限が切れています", "shared.over.help": "{time}まで有効でした。新しいリンクを受け取ってください。",
   "shared.broken": "リンクが途中で切れています", "shared.broken.help": "リンク全体をコピーし直すか、新しいリンクを受け取ってください。",
   "shared.gone": "このリンクは使えません", "shared.gone.help": "動画が削除された可能性があります。新しいリンクを受け取ってください。",
+
+  // Data sets.
+  "data.title": "データセット", "data.what": "1匹の動物の動画から作る、正解付きの多数の動物の画像です。手作業なしで、検出器や追跡器の学習に使えます。", "data.new": "新しいデータセット",
+  "data.films": "動画", "data.no_films": "計測済みの動画がありません。", "data.choose": "動画を1本以上選んでください。",
+  "data.scene": "場面：背景、かすみ、大きさ", "data.camera": "カメラ：明るさ、ぼけ、ノイズ、分割の割合",
+  "data.source": "動画の出典（READMEに記載）", "data.licence": "動画のライセンス（READMEに記載）",
+  "data.see": "見本を9枚見る", "data.make": "データセットを作る", "data.drawing": "見本を描いています…", "data.estimating": "大きさを見積もっています…",
+  "data.sheet": "正解を重ねた9枚の見本", "data.sheet.what": "輪郭線はマスクです。白い点は見えているキーポイント、赤い点は隠れているキーポイントです。",
+  "data.size": { other: "画像{pictures}枚、約{size}、描画に約{n}分" }, "data.started": "開始しました：{size}。",
+  "data.of": "{film}、画像{pictures}枚", "data.flocks": { other: "群れ{n}個" }, "data.save": "ZIPを保存", "data.save.of": "ZIPを保存：{name}", "data.file.of": "{name}の{file}", "data.sheet.of": "{name}の見本",
+  "set.flocks": "群れの数", "set.pictures": "群れごとの画像数", "set.every": "何フレームごとに1枚か", "set.counts": "群れの個体数（最小、最大）", "set.presets": "行動", "set.formats": "正解ファイル", "set.picture": "画像の形式", "set.picture.jpeg": "JPEG形式", "set.picture.png": "PNG形式（劣化なし）",
+  "set.backgrounds.plate": "動画の背景を使う重み", "set.backgrounds.color": "単色の背景を使う重み", "set.haze_per_bl": "かすみ（最小、最大）", "set.shadow": "影の濃さ（最小、最大）", "set.scale": "動画に対する大きさ（最小、最大）", "set.size_px": "幅と高さ（画素）",
+  "set.gain": "明るさ（最小、最大）", "set.color_gain": "色ごとの明るさ（最小、最大）", "set.blur_px": "ぼけ（画素、最小、最大）", "set.noise": "ノイズ（最小、最大）", "set.jpeg_quality": "JPEGの品質（最小、最大）", "set.split": "学習・検証・試験の割合",
+  "set.label.coco": "COCO形式（マスク、枠、キーポイント）", "set.label.mot": "MOTChallenge形式の軌跡", "set.label.yolo_detect": "YOLO形式の枠", "set.label.yolo_segment": "YOLO形式の輪郭", "set.label.yolo_pose": "YOLO形式のキーポイント", "set.label.dlc": "DeepLabCut形式", "set.label.tracks": "軌跡の表", "set.label.masks": "個体番号の画像", "set.label.depth": "奥行きの順序",
 
   // Virtual fish.
   "fish.title": "バーチャルフィッシュ：{film}",

@@ -21,7 +21,7 @@ SEED = "6"
 EXAMPLES = "12"
 CHECKS = "not_a_server_error,status_code_conformance,content_type_conformance,response_headers_conformance,response_schema_conformance"
 HOOKS = "hooks"
-FILES = {"libraries": "poses.json", "flocks": "flock.json", "fish": "model.glb"}
+FILES = {"libraries": "poses.json", "flocks": "flock.json", "fish": "model.glb", "datasets": "dataset.zip"}
 
 
 def main(program):
@@ -48,9 +48,11 @@ def furnish(program, address, folder):
     library = analysis["library_id"]
     flock = post(f"{address}/v1/flocks", {"library_id": library, "count": 2, "frames": 10})
     fish = post(f"{address}/v1/fish", {"library_id": library})
-    for made in (analysis, flock, fish):
+    wait_for_job(address, analysis["job_id"])
+    dataset = post(f"{address}/v1/datasets", {"library_ids": [library], "flocks": 1, "pictures": 2, "count": [1, 2]})
+    for made in (flock, fish, dataset):
         wait_for_job(address, made["job_id"])
-    ids = {"libraries": library, "flocks": flock["flock_id"], "fish": fish["fish_id"]}
+    ids = {"libraries": library, "flocks": flock["flock_id"], "fish": fish["fish_id"], "datasets": dataset["dataset_id"]}
     return {**ids, "footage": footage, "jobs": analysis["job_id"]}
 
 

@@ -74,8 +74,13 @@ class Walk:
         fish = self.call("POST /v1/fish", body={"library_id": library}).json()
         self.wait_for(flock["job_id"])
         self.wait_for(fish["job_id"])
+        asked = {"library_ids": [library], "flocks": 2, "pictures": 2, "count": [1, 2], "licence": "CC0"}
+        self.call("POST /v1/datasets/estimate", body=asked)
+        self.call("POST /v1/datasets/preview", body=asked)
+        dataset = self.call("POST /v1/datasets", body=asked).json()
+        self.wait_for(dataset["job_id"])
         return {"footage": footage, "library": library, "flock": flock["flock_id"], "fish": fish["fish_id"],
-                "job": flock["job_id"]}
+                "dataset": dataset["dataset_id"], "job": flock["job_id"]}
 
     def refuse(self):
         """Analyzes a film that must be refused, and gets the picture of the refusal."""
@@ -105,9 +110,10 @@ class Walk:
             self.call("PATCH /v1/uploads/{id}", whole, body=piece, media_type=PIECE, headers=at)
 
     def read(self, ids):
-        for nouns in ("footage", "libraries", "flocks", "fish", "jobs"):
+        for nouns in ("footage", "libraries", "flocks", "fish", "datasets", "jobs"):
             assert self.call(f"GET /v1/{nouns}", query={"limit": 1}).json()["items"]
-        for noun, nouns, file in (("library", "libraries", "poses.json"), ("flock", "flocks", "video.mp4"), ("fish", "fish", "model.glb")):
+        for noun, nouns, file in (("library", "libraries", "poses.json"), ("flock", "flocks", "video.mp4"), ("fish", "fish", "model.glb"),
+                                 ("dataset", "datasets", "dataset.zip")):
             self.call(f"GET /v1/{nouns}/{{id}}", {"id": ids[noun]})
             self.call(f"GET /v1/{nouns}/{{id}}/{{file}}", {"id": ids[noun], "file": file})
             self.call(f"PATCH /v1/{nouns}/{{id}}", {"id": ids[noun]}, body={"pinned": True})
@@ -133,7 +139,7 @@ class Walk:
         self.call("DELETE /v1/jobs/{id}", {"id": queued})
         self.wait_for(queued, "cancelled")
         self.call("POST /v1/jobs/{id}/retry", {"id": queued})
-        for noun, nouns in (("fish", "fish"), ("flock", "flocks"), ("library", "libraries"), ("footage", "footage")):
+        for noun, nouns in (("dataset", "datasets"), ("fish", "fish"), ("flock", "flocks"), ("library", "libraries"), ("footage", "footage")):
             self.call(f"DELETE /v1/{nouns}/{{id}}", {"id": ids[noun]})
 
 

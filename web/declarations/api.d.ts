@@ -8,6 +8,7 @@ declare namespace Api {
   type Library = Schemas["LibraryView"];
   type Flock = Schemas["FlockView"];
   type Fish = Schemas["FishView"];
+  type Dataset = Schemas["DatasetView"];
   type Job = Schemas["JobView"];
   type Advice = Schemas["Advice"];
   type FlockParams = Schemas["FlockParams"];

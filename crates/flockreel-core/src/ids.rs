@@ -40,6 +40,8 @@ id! {
     FlockId
     /// One virtual fish.
     FishId
+    /// One labelled data set.
+    DatasetId
     /// One job of the queue.
     JobId
 }

@@ -2,6 +2,7 @@
 //! preview and share flocks.
 
 pub(super) mod create; // JSON or a form -> queued job
+pub(super) mod datasets; // many flocks with labels
 pub(super) mod links; // signed links to files
 pub(super) mod preview; // flock.json without a video
 pub(super) mod school; // virtual animals in one 3-D model

@@ -15,7 +15,7 @@ use flockreel_core::flock::{Flock, Params};
 use flockreel_core::formats::{flock_json, flock_plan, params};
 
 /// Largest product of individuals and frames of a preview: about a second of computing.
-const MAX_PREVIEWED_POSES: u64 = 200_000;
+pub(super) const MAX_PREVIEWED_POSES: u64 = 200_000;
 
 /// Preview a flock without a video.
 ///

@@ -261,7 +261,7 @@ fn subject(row: &JobRow) -> Option<JobSubject> {
     let kind = match row.kind {
         Kind::Sample => return None,
         Kind::Analysis => "footage",
-        Kind::Views | Kind::Flock | Kind::Fish => "library",
+        Kind::Views | Kind::Flock | Kind::Fish | Kind::Dataset => "library",
     };
     row.subject_id().map(|id| JobSubject { kind, id })
 }

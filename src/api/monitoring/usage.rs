@@ -23,11 +23,13 @@ pub(in crate::api) struct UsageView {
     flocks: AmountView,
     /// Virtual fish.
     fish: AmountView,
+    /// Data sets, with what unfinished ones have kept.
+    datasets: AmountView,
     /// Open resumable uploads, with their announced sizes.
     uploads: AmountView,
     /// Announced size of the bodies of requests that are being received, bytes.
     incoming_bytes: i64,
-    /// Days after which footage, libraries, flocks and virtual fish that nobody used are deleted; null = never.
+    /// Days after which footage, libraries, flocks, virtual fish and data sets that nobody used are deleted; null = never.
     keep_days: Option<u32>,
     /// Days after which failed and cancelled jobs are deleted; null = never.
     keep_jobs_days: Option<u32>,
@@ -59,7 +61,7 @@ pub(in crate::api) async fn get_usage(access: Access) -> JsonAnswer<UsageView> {
 impl UsageView {
     fn new(usage: Usage, retention: Retention) -> UsageView {
         let used_bytes = usage.used_bytes();
-        let [footage, mut libraries, flocks, fish, views]: [AmountView; 5] =
+        let [footage, mut libraries, flocks, fish, views, datasets]: [AmountView; 6] =
             usage.stored.map(|(_, amount)| amount.into());
         libraries.size_bytes += views.size_bytes;
         let days = |n_days: u32| Some(n_days).filter(|n_days| *n_days > 0);
@@ -70,6 +72,7 @@ impl UsageView {
             libraries,
             flocks,
             fish,
+            datasets,
             uploads: usage.uploads.into(),
             incoming_bytes: usage.incoming_bytes,
             keep_days: days(retention.keep_days),

@@ -7,7 +7,7 @@ use utoipa::openapi::tag::Tag;
 use utoipa::openapi::{OpenApi, RefOr};
 
 /// Parts of the API in the order of a first use: name, and what it is.
-const TAGS: [(&str, &str); 9] = [
+const TAGS: [(&str, &str); 10] = [
     ("footage", "Uploaded videos."),
     ("uploads", "Resumable uploads of footage (tus 1.0.0)."),
     ("analyses", "Measurements of footage, which make libraries."),
@@ -20,6 +20,10 @@ const TAGS: [(&str, &str); 9] = [
         "Flocks made of a library, their previews and their links.",
     ),
     ("fish", "Virtual fish that move as the animal did."),
+    (
+        "datasets",
+        "Labelled pictures of many flocks, for training.",
+    ),
     ("jobs", "Queued work, its progress and its failures."),
     ("session", "Signing in of browsers."),
     ("service", "Used space, error codes, health and metrics."),
@@ -70,6 +74,9 @@ fn example(path: &str) -> Option<(HttpMethod, Value)> {
             "library_id": "sample", "count": 20, "frames": 120, "seed": 1,
         })),
         "/v1/fish" => post(json!({"library_id": "sample"})),
+        "/v1/datasets" | "/v1/datasets/estimate" | "/v1/datasets/preview" => post(json!({
+            "library_ids": ["sample"], "flocks": 4, "pictures": 20, "count": [2, 10],
+        })),
         "/v1/flocks/{id}/links" => post(json!({"file": "video.mp4", "expires_s": 3600})),
         "/v1/footage/{id}" => Some((HttpMethod::Patch, json!({"name": "zebra finch.mp4"}))),
         "/v1/libraries/{id}" => Some((HttpMethod::Patch, json!({"px_per_cm": 42}))),

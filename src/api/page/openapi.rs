@@ -17,7 +17,7 @@ use utoipa::openapi::{OpenApi, RefOr, Required};
 use super::asset::Asset;
 use crate::api::{AppState, idempotency};
 use flockreel_core::parameters::Parameters;
-use flockreel_core::{analysis, fish, flock};
+use flockreel_core::{analysis, dataset, fish, flock};
 
 /// Title and security schemes of the document. The routes add their own entries.
 #[derive(utoipa::OpenApi)]
@@ -68,6 +68,7 @@ pub(in crate::api) fn join_flattened(document: &mut OpenApi) {
         ("FlockOverrides", flock::Params::PRESETS),
         ("FlockRequest", flock::Params::PRESETS),
         ("FishRequest", fish::Params::PRESETS),
+        ("DatasetRequest", dataset::Params::PRESETS),
     ] {
         let Some(RefOr::T(Schema::AllOf(all))) = components.schemas.get(name) else {
             continue;
@@ -87,8 +88,10 @@ pub(in crate::api) fn join_flattened(document: &mut OpenApi) {
                 joined.required.extend(part.required.clone());
             }
         }
-        let preset = RefOr::T(Schema::Object(preset_schema(presets)));
-        joined.properties.insert("preset".to_owned(), preset);
+        if !presets.is_empty() {
+            let preset = RefOr::T(Schema::Object(preset_schema(presets)));
+            joined.properties.insert("preset".to_owned(), preset);
+        }
         let joined = RefOr::T(Schema::Object(joined));
         components.schemas.insert(name.to_owned(), joined);
     }

@@ -94,8 +94,8 @@ impl JobInput for Input {
     const KIND: Kind = Kind::Analysis;
     type ResultId = LibraryId;
 
-    fn subject(&self) -> Option<Subject> {
-        Some(Subject::Footage(self.footage_id))
+    fn subjects(&self) -> Vec<Subject> {
+        vec![Subject::Footage(self.footage_id)]
     }
 
     /// The film is decoded twice.

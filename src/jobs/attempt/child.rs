@@ -55,7 +55,7 @@ pub fn run(folder: &Path) -> io::Result<()> {
             }),
             Task::Inspection => admit::inspect(folder).map(End::Inspected),
             Task::Preview(params) => {
-                preview::compute(&order.subject, params, &*reporter).map(End::Previewed)
+                preview::compute(order.subject(), params, &*reporter).map(End::Previewed)
             }
         })
     });

@@ -52,7 +52,7 @@ async fn run(
     draft: &Draft,
 ) -> Result<End, Error> {
     let listener = Listener::new(&[]);
-    let running = run_child(context, task, subject, draft, &listener);
+    let running = run_child(context, task, subject, draft, &listener, None);
     match timeout(context.check_time, running).await {
         // Files that crash their reader are refused. A signal from outside says nothing about them.
         Ok(Err(Error::Crashed(status))) if status.signal() != Some(Signal::KILL.as_raw()) => {

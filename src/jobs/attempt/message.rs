@@ -1,7 +1,7 @@
 //! Messages between the service and its child, one line of JSON each: the order on the child's stdin, then progress and
 //! the end on its stdout.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
@@ -19,16 +19,25 @@ use flockreel_core::ids::JobId;
 pub(super) struct Order {
     /// What to do.
     pub(super) task: Task,
-    /// Folder with the files of the footage or library that the task works on; empty for a sample.
-    pub(super) subject: PathBuf,
+    /// Folders with the files of the footage or libraries that the task works on; none for a sample.
+    pub(super) subjects: Vec<PathBuf>,
     /// Folder with the files of the footage from which the library of a views job was made; else empty.
     pub(super) film: PathBuf,
+    /// Parts that earlier attempts at the job have kept.
+    pub(super) parts: Vec<Part>,
     /// Number of threads to use.
     pub(super) threads: usize,
     /// Limit of the memory, bytes.
     pub(super) memory_bytes: u64,
     /// The media tools.
     pub(super) tools: FoundTools,
+}
+
+impl Order {
+    /// Returns the folder of the first subject; an empty path for a sample.
+    pub(super) fn subject(&self) -> &Path {
+        (self.subjects.first()).map_or(Path::new(""), PathBuf::as_path)
+    }
 }
 
 /// What a child does.
@@ -60,6 +69,15 @@ pub(super) struct Job {
     pub(super) footage: Option<FootageSummary>,
 }
 
+/// A part of the result that an earlier attempt has kept.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Part {
+    /// Number of the part.
+    pub number: u32,
+    /// Folder with the files that later attempts need.
+    pub folder: PathBuf,
+}
+
 /// A line of the child.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -68,6 +86,9 @@ pub(super) enum Message {
     Progress(String, f64),
     /// Number of decoded frames, and the seconds that they took.
     Decoded(u64, f64),
+    /// A part of the result is finished and synced: its number, and the files in its folder. The worker stores it and
+    /// takes the folder away.
+    Part(u32, Vec<File>),
     /// The last line.
     End(End),
 }

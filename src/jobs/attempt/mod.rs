@@ -8,6 +8,7 @@
 mod child; // the child: computes and reports
 mod decoding; // metrics of decoding
 mod inspection; // check of received files, and preview of an analysis
+mod keep; // finished parts of a result
 mod message; // what worker and child tell each other
 mod process; // the worker's side: starts the child and follows it
 mod reporter; // progress and cancellation of the child
@@ -18,7 +19,8 @@ use std::sync::Arc;
 pub use child::run;
 pub(super) use decoding::Counted;
 pub(super) use inspection::{CHECK_TIME, inspect, preview};
-pub use message::{Film, Product};
+pub use keep::KEPT_FILES;
+pub use message::{Film, Part, Product};
 pub(super) use process::compute;
 pub use reporter::Reporter;
 
@@ -69,7 +71,12 @@ impl Attempt<'_> {
 
     /// Returns the path of a file of the footage or library that the job works on. The file may be absent.
     pub fn subject_file(&self, name: &str) -> PathBuf {
-        self.order.subject.join(name)
+        self.order.subject().join(name)
+    }
+
+    /// Returns the folders of all libraries that the job works on.
+    pub fn libraries(&self) -> &[PathBuf] {
+        &self.order.subjects
     }
 
     /// Returns the path of a file of the footage from which the library of a views job was made.
@@ -79,8 +86,8 @@ impl Attempt<'_> {
 
     /// Reads the poses and the parameters of the library that the job works on, and nothing else of it.
     pub fn measurement(&self) -> Result<(Poses, Params), Error> {
-        let poses = library_dir::read_poses(&self.order.subject)?;
-        Ok((poses, library_dir::read_params(&self.order.subject)?))
+        let poses = library_dir::read_poses(self.order.subject())?;
+        Ok((poses, library_dir::read_params(self.order.subject())?))
     }
 
     /// Returns the hash and size of the footage that the job works on. Fails if that is no footage.
@@ -92,6 +99,6 @@ impl Attempt<'_> {
     /// Reads the library that the job works on.
     pub fn library(&self) -> Result<Library, Error> {
         self.reporter.report("loading", 0.0);
-        Ok(library_dir::read(&self.order.subject, self.scratch())?.library)
+        Ok(library_dir::read(self.order.subject(), self.scratch())?.library)
     }
 }

@@ -17,11 +17,12 @@ use tokio_util::task::AbortOnDropHandle;
 use tracing::Instrument;
 use uuid::Uuid;
 
+use super::keep::{self, PartStore};
 use super::message::{End, Failure, File, Job, Message, Order, Task};
-use super::{Film, Product};
+use super::{Film, Part, Product};
 use crate::jobs::error::FailedAttempt;
 use crate::jobs::sample::FILM_NAME;
-use crate::jobs::{Context, Error, Listener, Subject, refusal, subject};
+use crate::jobs::{Context, Error, Listener, Subject, refusal, subjects};
 use crate::store::blobs::hex;
 use crate::store::footage::{BACKGROUND, Footage, MASKS, SampleFootage, VIDEO};
 use crate::store::jobs::finish::{Outcome, Source};
@@ -45,12 +46,14 @@ const OUT_OF_MEMORY: &[u8] = b"memory allocation of ";
 /// The files that an attempt works on. Copies are removed on drop.
 #[derive(Default)]
 pub(super) struct SubjectFiles {
-    /// Id of the footage or library; `None` for a sample, which is made of nothing.
-    id: Option<Uuid>,
-    files: Option<Fetched>,
+    /// Ids of the footage or libraries; none for a sample, which is made of nothing.
+    ids: Vec<Uuid>,
+    files: Vec<Fetched>,
     /// Files of the footage from which the library of a views job was made.
     film: Option<Fetched>,
     footage: Option<FootageSummary>,
+    /// Parts that earlier attempts have kept.
+    parts: Vec<(u32, Fetched)>,
 }
 
 /// Computes a job in a child process and stores its files. If the future is dropped, the child is killed.
@@ -73,9 +76,9 @@ pub(in crate::jobs) async fn compute(
             return Err(error);
         }
     };
-    let source = match (product.film, subject.id) {
+    let source = match (product.film, subject.ids.first()) {
         (Some(film), _) => Source::Sample(film.into()),
-        (None, Some(id)) => Source::Resource(id),
+        (None, Some(id)) => Source::Resource(*id),
         (None, None) => return Err(io::Error::other("a sample has no film").into()),
     };
     // The fence in the name prevents two attempts from sharing a folder.
@@ -91,50 +94,58 @@ pub(in crate::jobs) async fn compute(
     })
 }
 
-/// Finds the footage or library of a job, and makes its files local.
+/// Finds what a job works on, and makes its files local.
 async fn fetch_subject(context: &Context, lease: &Lease) -> Result<SubjectFiles, Error> {
-    let store = &context.store;
-    let subject = subject(lease.kind, &lease.input)?;
-    let Some(subject) = subject else {
-        return Ok(SubjectFiles::default());
-    };
-    let (files, film, footage) = match subject {
-        Subject::Footage(id) => {
-            let row = row::<Footage>(context, id.0).await?;
-            let files = store.fetch(&row.folder, &[VIDEO, BACKGROUND, MASKS]).await;
-            let footage = FootageSummary {
-                sha256: hex(&row.sha256),
-                n_bytes: row.size_bytes.unsigned_abs(),
-            };
-            (files?, None, Some(footage))
-        }
-        Subject::Library(id) => {
-            let row = row::<Library>(context, id.0).await?;
-            let (names, film) = if lease.kind == Kind::Views {
-                let footage = self::row::<Footage>(context, row.footage_id).await?;
-                let film = store.fetch(&footage.folder, &[VIDEO]).await?;
-                (&library_dir::MEASUREMENT[..], Some(film))
-            } else {
-                (&library_dir::FILES[..], None)
-            };
-            (store.fetch(&row.folder, names).await?, film, None)
-        }
-    };
-    Ok(SubjectFiles {
-        id: Some(subject.id()),
-        files: Some(files),
-        film,
-        footage,
-    })
+    let mut found = SubjectFiles::default();
+    for subject in subjects(lease.kind, &lease.input)? {
+        found.add(context, lease, subject).await?;
+    }
+    found.parts = keep::fetch(context, lease).await?;
+    Ok(found)
 }
 
 impl SubjectFiles {
     /// Returns files that belong to no job.
     pub(super) fn of(files: Fetched) -> SubjectFiles {
         SubjectFiles {
-            files: Some(files),
+            files: vec![files],
             ..SubjectFiles::default()
         }
+    }
+
+    async fn add(
+        &mut self,
+        context: &Context,
+        lease: &Lease,
+        subject: Subject,
+    ) -> Result<(), Error> {
+        let store = &context.store;
+        let files = match subject {
+            Subject::Footage(id) => {
+                let row = row::<Footage>(context, id.0).await?;
+                self.footage = Some(FootageSummary {
+                    sha256: hex(&row.sha256),
+                    n_bytes: row.size_bytes.unsigned_abs(),
+                });
+                store
+                    .fetch(&row.folder, &[VIDEO, BACKGROUND, MASKS])
+                    .await?
+            }
+            Subject::Library(id) => {
+                let row = row::<Library>(context, id.0).await?;
+                let names = if lease.kind == Kind::Views {
+                    let footage = self::row::<Footage>(context, row.footage_id).await?;
+                    self.film = Some(store.fetch(&footage.folder, &[VIDEO]).await?);
+                    &library_dir::MEASUREMENT[..]
+                } else {
+                    &library_dir::FILES[..]
+                };
+                store.fetch(&row.folder, names).await?
+            }
+        };
+        self.ids.push(subject.id());
+        self.files.push(files);
+        Ok(())
     }
 }
 
@@ -159,25 +170,38 @@ async fn compute_in(
         input: lease.input.clone(),
         footage: subject.footage.clone(),
     };
-    match run_child(context, Task::Attempt(job), subject, draft, listener).await? {
+    let parts = Some(PartStore {
+        context,
+        lease,
+        draft,
+    });
+    match run_child(context, Task::Attempt(job), subject, draft, listener, parts).await? {
         End::Done(product, files) => Ok((product, files)),
         _ => Err(io::Error::other("an attempt has no result").into()),
     }
 }
 
-/// Runs the child in the folder of the draft, and returns how it ended. Fails with the error that it reports.
+/// Runs the child in the folder of the draft, and returns how it ended. Stores the parts that it makes. Fails with the
+/// error that it reports.
 pub(super) async fn run_child(
     context: &Context,
     task: Task,
     subject: &SubjectFiles,
     draft: &Draft,
     listener: &Listener,
+    parts: Option<PartStore<'_>>,
 ) -> Result<End, Error> {
     let tools = spawn_blocking(media::found_tools).await;
     let order = Order {
         task,
-        subject: path(&subject.files),
-        film: path(&subject.film),
+        subjects: subject.files.iter().map(path).collect(),
+        film: subject.film.as_ref().map(path).unwrap_or_default(),
+        parts: (subject.parts.iter())
+            .map(|(number, files)| Part {
+                number: *number,
+                folder: path(files),
+            })
+            .collect(),
         threads: context.threads,
         memory_bytes: context.memory_bytes,
         tools: tools.map_err(io::Error::other)??,
@@ -186,15 +210,14 @@ pub(super) async fn run_child(
     let group = spawn_blocking(move || media::ProcessGroup::start_leashed(command)).await;
     let group = group.map_err(io::Error::other)??;
     let grace = STOP_GRACE.min(context.lease);
-    match follow(group, &order, listener, grace).await? {
+    match follow(group, &order, (listener, parts), grace).await? {
         End::Failed(failure) => Err(Error::Attempt(failed(failure, draft))),
         end => Ok(end),
     }
 }
 
-/// Returns the folder of fetched files; an empty path if there are none.
-fn path(files: &Option<Fetched>) -> PathBuf {
-    (files.as_ref()).map_or_else(Default::default, |files| files.path().to_owned())
+fn path(files: &Fetched) -> PathBuf {
+    files.path().to_owned()
 }
 
 /// Returns the command of a child. It inherits no environment, which may hold secrets.
@@ -213,12 +236,12 @@ fn command((program, arguments): &(PathBuf, Vec<OsString>), folder: &Path) -> Co
     command
 }
 
-/// Gives the order, passes on progress, and returns how the attempt ended. Kills the child if it does not end within
-/// `grace` after it was asked to stop.
+/// Gives the order, passes on progress, stores parts, and returns how the attempt ended. Kills the child if it does not
+/// end within `grace` after it was asked to stop.
 async fn follow(
     mut group: media::ProcessGroup,
     order: &Order,
-    listener: &Listener,
+    (listener, parts): (&Listener, Option<PartStore<'_>>),
     grace: Duration,
 ) -> Result<End, Error> {
     let (Some(stdin), Some(stdout), Some(stderr)) = group.take_pipes() else {
@@ -229,7 +252,8 @@ async fn follow(
     let feeding = tokio::spawn(feed(stdin, order, listener.clone()));
     let feeding = AbortOnDropHandle::new(feeding);
     let log = tokio::spawn(relay_log(Receiver::from_owned_fd(stderr.into())?).in_current_span());
-    let mut messages = pin!(read(Receiver::from_owned_fd(stdout.into())?, listener));
+    let stdout = Receiver::from_owned_fd(stdout.into())?;
+    let mut messages = pin!(read(stdout, listener, parts));
     let end = tokio::select! {
         end = &mut messages => Ok(end),
         () = listener.stopped() => timeout(grace, &mut messages).await,
@@ -240,7 +264,7 @@ async fn follow(
     let status = spawn_blocking(move || group.end_within(patience)).await;
     let status = status.map_err(io::Error::other)??;
     let is_out_of_memory = timeout(grace, log).await;
-    match end.ok().flatten() {
+    match end.ok().transpose()?.flatten() {
         Some(end) => Ok(end),
         None if listener.is_cancelled() => Err(Error::Cancelled),
         None => Err(verdict(status, matches!(is_out_of_memory, Ok(Ok(true))))),
@@ -255,23 +279,36 @@ async fn feed(mut stdin: Sender, order: String, listener: Listener) {
     listener.stopped().await;
 }
 
-/// Passes on progress and returns the end of the attempt, or `None` if the child does not tell it.
-async fn read(stdout: Receiver, listener: &Listener) -> Option<End> {
+/// Passes on progress, stores parts, and returns the end of the attempt, or `None` if the child does not tell it. Fails if
+/// a part could not be stored.
+async fn read(
+    stdout: Receiver,
+    listener: &Listener,
+    parts: Option<PartStore<'_>>,
+) -> Result<Option<End>, Error> {
     let mut stdout = BufReader::new(stdout);
-    loop {
-        let line = next_line(&mut stdout).await?;
+    while let Some(line) = next_line(&mut stdout).await {
         let message = serde_json::from_slice(&line).inspect_err(
             |error| tracing::warn!(%error, "the process of a job sent an unreadable line"),
         );
-        match message.ok()? {
+        let Ok(message) = message else {
+            break;
+        };
+        match message {
             Message::Progress(stage, fraction) => listener.report(&stage, fraction),
             Message::Decoded(n_frames, took_s) => {
                 let took = Duration::try_from_secs_f64(took_s).unwrap_or_default();
                 listener.count_decoded(n_frames, took);
             }
-            Message::End(end) => return Some(end),
+            Message::Part(number, files) => {
+                if let Some(parts) = &parts {
+                    parts.keep(number, files, listener).await?;
+                }
+            }
+            Message::End(end) => return Ok(Some(end)),
         }
     }
+    Ok(None)
 }
 
 /// Passes the log of the child on. Returns whether the child ran out of memory.

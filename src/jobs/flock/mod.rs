@@ -71,8 +71,8 @@ impl JobInput for Input {
     const KIND: Kind = Kind::Flock;
     type ResultId = FlockId;
 
-    fn subject(&self) -> Option<Subject> {
-        Some(Subject::Library(self.library_id))
+    fn subjects(&self) -> Vec<Subject> {
+        vec![Subject::Library(self.library_id)]
     }
 
     /// Every frame is encoded once for each file, and every individual is planned and drawn.

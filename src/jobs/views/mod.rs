@@ -39,8 +39,8 @@ impl JobInput for Input {
     // The views have no address of their own.
     type ResultId = LibraryId;
 
-    fn subject(&self) -> Option<Subject> {
-        Some(Subject::Library(self.library_id))
+    fn subjects(&self) -> Vec<Subject> {
+        vec![Subject::Library(self.library_id)]
     }
 
     /// Never small: the workers for small jobs do what people wait for.

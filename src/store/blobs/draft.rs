@@ -123,6 +123,14 @@ impl Draft {
         &self.path
     }
 
+    /// Returns a folder in the draft as a draft of its own.
+    pub fn part(&self, name: &str) -> Draft {
+        Draft {
+            path: self.path.join(name),
+            adopted: false,
+        }
+    }
+
     /// Moves the draft to its final place. It is then no longer removed on drop.
     pub(super) fn move_to(mut self, place: &Path) -> io::Result<()> {
         fs::rename(&self.path, place)?;

@@ -164,6 +164,7 @@ mod tests {
         let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name()).collect();
         names.sort();
         let wanted = [
+            "datasets",
             "fish",
             "flocks",
             "footage",

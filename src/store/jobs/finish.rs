@@ -83,7 +83,10 @@ impl Outcome {
     }
 }
 
-async fn owner_of(transaction: &mut Transaction, lease: &Lease) -> Result<Owner, sqlx::Error> {
+pub(super) async fn owner_of(
+    transaction: &mut Transaction,
+    lease: &Lease,
+) -> Result<Owner, sqlx::Error> {
     let owner = sql::query_scalar("select owner from jobs where id = $1").bind(lease.job_id.0);
     Ok(Owner(owner.fetch_one(transaction).await?))
 }

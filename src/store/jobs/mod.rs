@@ -10,6 +10,8 @@
 //!            | '-- requeue, release, rescue           |
 //!            '-- retry, by a user --------------------'
 //! ```
+//! A job may keep finished parts of its result while it runs (`keep`), so that a later attempt goes on from them.
+//!
 //! The queue never deletes rows, because users want to see the history of their jobs.
 
 pub mod cancel;
@@ -20,6 +22,7 @@ pub mod fail;
 pub mod finish;
 mod follow;
 pub mod heartbeat;
+pub mod keep;
 pub mod read;
 pub mod release;
 pub mod requeue;
@@ -50,6 +53,8 @@ pub enum Kind {
     Flock,
     /// Makes a virtual fish from a library.
     Fish,
+    /// Makes a labelled data set from libraries.
+    Dataset,
 }
 
 /// State of a job.
@@ -112,12 +117,13 @@ pub enum Change {
 
 impl Kind {
     /// All kinds.
-    pub const ALL: [Kind; 5] = [
+    pub const ALL: [Kind; 6] = [
         Kind::Sample,
         Kind::Analysis,
         Kind::Views,
         Kind::Flock,
         Kind::Fish,
+        Kind::Dataset,
     ];
 
     /// Returns the name used in the database and in the API.
@@ -128,6 +134,7 @@ impl Kind {
             Kind::Views => "views",
             Kind::Flock => "flock",
             Kind::Fish => "fish",
+            Kind::Dataset => "dataset",
         }
     }
 
@@ -139,6 +146,7 @@ impl Kind {
             Kind::Views => ResourceKind::Views,
             Kind::Flock => ResourceKind::Flock,
             Kind::Fish => ResourceKind::Fish,
+            Kind::Dataset => ResourceKind::Dataset,
         }
     }
 }

@@ -14,6 +14,7 @@ pub(super) const SELECT: &str = "select id, kind, state, result_id, cancel_reque
     progress, code, detail, mends, created_ms, started_ms, finished_ms, refused_jpeg is not null as has_picture, \
     (select b.state from jobs b where b.id = r.after_job) as state_before, \
     case kind when 'sample' then null when 'analysis' then json_extract(input, '$.footage_id') \
+    when 'dataset' then json_extract(input, '$.library_ids[0]') \
     else json_extract(input, '$.library_id') end as subject, \
     case when kind = 'analysis' and state = 'failed' then json_extract(input, '$.params') end as params from jobs r";
 

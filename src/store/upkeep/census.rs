@@ -38,8 +38,9 @@ impl Store {
             "offset_bytes",
             "uploads where footage_id is null",
         );
+        let parts = ("dataset_parts", "size_bytes", "job_parts");
         let mut stored_bytes = Vec::new();
-        for (name, column, rows) in sources.into_iter().chain([uploads]) {
+        for (name, column, rows) in sources.into_iter().chain([parts, uploads]) {
             let sql = format!("select cast(coalesce(sum({column}), 0) as bigint) from {rows}");
             let n_bytes = sql::query_scalar(sql).fetch_one(&self.reader).await?;
             stored_bytes.push((name, n_bytes));

@@ -7,12 +7,13 @@
 use sqlx::types::Uuid;
 
 use crate::config::Retention;
-use crate::store::resources::ResourceKind;
+use crate::store::resources::{ResourceKind, is_dataset_of};
 use crate::store::space::Amount;
 use crate::store::{Error, Store, sql};
 
 /// Kinds of resources in the order of their deletion: results before their sources. Views are deleted with their library.
-const ORDER: [ResourceKind; 4] = [
+const ORDER: [ResourceKind; 5] = [
+    ResourceKind::Dataset,
     ResourceKind::Fish,
     ResourceKind::Flock,
     ResourceKind::Library,
@@ -125,9 +126,23 @@ impl Store {
 
     /// Deletes jobs that failed or were cancelled before `before_ms`.
     async fn prune_jobs(&self, before_ms: i64) -> Result<u64, Error> {
+        // The sweep removes the folders of the parts, which then have no rows.
         let delete = || async {
+            let mut transaction = self.writer.begin().await?;
+            let of_old_jobs = format!("job_id in (select id {OLD_JOBS})");
+            for sql in [
+                format!(
+                    "delete from blobs where folder in (select folder from job_parts where {of_old_jobs})"
+                ),
+                format!("delete from job_parts where {of_old_jobs}"),
+            ] {
+                let delete = sql::query(sql).bind(before_ms);
+                delete.execute(&mut transaction).await?;
+            }
             let delete = sql::query(format!("delete {OLD_JOBS}")).bind(before_ms);
-            Ok(delete.execute(&self.writer).await?)
+            let n_jobs = delete.execute(&mut transaction).await?;
+            transaction.commit().await?;
+            Ok(n_jobs)
         };
         self.reserve.lend(delete).await
     }
@@ -148,8 +163,11 @@ fn kept(kind: ResourceKind, row: &str) -> String {
         )
     };
     let needed = match kind {
-        ResourceKind::Flock | ResourceKind::Fish | ResourceKind::Views => String::new(),
+        ResourceKind::Flock | ResourceKind::Fish | ResourceKind::Views | ResourceKind::Dataset => {
+            String::new()
+        }
         ResourceKind::Library => [
+            dataset_of(row),
             child(ResourceKind::Flock, "k", "library_id"),
             child(ResourceKind::Fish, "v", "library_id"),
             job("library_id"),
@@ -162,6 +180,18 @@ fn kept(kind: ResourceKind, row: &str) -> String {
         .join(" "),
     };
     format!("({row}.pinned or {row}.used_ms >= $1 {needed})")
+}
+
+/// Returns the condition that a data set of this library stays, or is being made.
+fn dataset_of(row: &str) -> String {
+    let (is_of, kept) = (
+        is_dataset_of(&format!("{row}.id")),
+        kept(ResourceKind::Dataset, "d"),
+    );
+    format!(
+        "or exists (select 1 from jobs j left join datasets d on d.job_id = j.id \
+         where {is_of} and (j.state in ('queued', 'running') or {kept}))"
+    )
 }
 
 #[cfg(test)]

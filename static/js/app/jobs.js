@@ -134,6 +134,6 @@ export const resultOf = (job) => job.links.result.split("/").at(-1) ?? "";
 export const subjectIdOf = (job) => job.subject?.id ?? "";
 
 /** @type {Record<string, string>} */
-const PLACES = { analysis: "/libraries/", views: "/libraries/", flock: "/flocks/", sample: "/films/" };
+const PLACES = { analysis: "/libraries/", views: "/libraries/", flock: "/flocks/", dataset: "/datasets?made=", sample: "/films/" };
 /** Returns the address at which the page shows the result of a job. @param {Api.Job} job */
 export const addressOf = (job) => (job.kind === "fish" ? `/libraries/${subjectIdOf(job)}/fish?fish=${resultOf(job)}` : PLACES[job.kind] + resultOf(job));

@@ -29,7 +29,7 @@ export function remember(kind, items) {
   for (const item of items) known.set(`/v1/${kind}/${item.id}`, Promise.resolve(item));
 }
 
-/** Returns the name of a film as a person would write it, or "film". @param {Api.Footage | Api.Library | null} one */
+/** Returns the name of a film as a person would write it, or "film". @param {{name: string, sample: boolean} | null} one */
 export function filmName(one) {
   if (one?.sample) return say("film.sample");
   return (one?.name || "").replace(/\.[a-z0-9]{2,5}$/i, "").replaceAll("_", " ").trim() || say("film.unnamed");

@@ -23,6 +23,7 @@ const ROUTES = [
   { pattern: /^\/libraries\/([^/]+)\/fish$/, place: "fish", nav: "films" },
   { pattern: /^\/flocks$/, place: "reels", nav: "flocks" },
   { pattern: /^\/flocks\/([^/]+)$/, place: "reel", nav: "flocks" },
+  { pattern: /^\/datasets$/, place: "datasets", nav: "flocks" },
   { pattern: /^\/jobs$/, place: "jobs", nav: "jobs" },
   { pattern: /^\/s\/([^/]+)$/, place: "shared", nav: "" },
 ];

@@ -102,7 +102,7 @@ export async function show(root, { life }) {
   jobs.watch((every) => {
     tellStates();
     // A new job may be of a new film, a done one makes a library.
-    const fresh = every.filter((job) => !["flock", "views"].includes(job.kind) && !known.has(stateKey(job)));
+    const fresh = every.filter((job) => !["flock", "views", "dataset"].includes(job.kind) && !known.has(stateKey(job)));
     known = new Set(every.map(stateKey));
     if (fresh.length) {
       refresh(new Set(fresh.map(subjectIdOf))).catch(() => {});

@@ -29,7 +29,7 @@ export async function show(root, { query, life }) {
   const cards = element("ul.cards");
   const more = element("button.quiet", { type: "button", hidden: true, onclick: () => fill(PAGE).catch(tell) }, say("more"));
   const trouble = element("div");
-  root.append(element("header.place-head", {}, element("h1", { tabIndex: -1 }, say("reels.title")), element("div.reels-search", {}, search)), running, found, empty, trouble, cards, element("p", {}, more));
+  root.append(element("header.place-head", {}, element("h1", { tabIndex: -1 }, say("reels.title")), element("div.reels-search", {}, search, element("a.button.quiet", { href: "/datasets" }, say("data.title")))), running, found, empty, trouble, cards, element("p", {}, more));
   /** @type {{id: string, name: string, node: HTMLElement}[]} */
   let all = [];
   /** @type {Api.Next<"/v1/flocks">} */

@@ -32,11 +32,11 @@ export function control(field, studio) {
  * Puts name, help and reset around an input.
  * @param {Field} field @param {Studio} studio @param {{input: HTMLInputElement | HTMLSelectElement | null, below?: HTMLElement, before?: boolean}} parts `input` stands in the line of the name
  */
-export function framed({ name, help }, studio, { input, below, before = false }) {
+export function framed({ name, help, words = name }, studio, { input, below, before = false }) {
   const id = `control-${n_controls += 1}`;
-  const title = nameOf(name);
+  const title = nameOf(words);
   // The service describes its settings in English only.
-  const hint = sayOr(`hint.${name}`, "");
+  const hint = sayOr(`hint.${words}`, "");
   const more = element("p.help", { id: `${id}-help`, hidden: true, ...(hint ? {} : { lang: "en" }) }, hint || help);
   const open = element("button.small-button", { type: "button", "aria-label": say("set.help", { name: title }), "aria-expanded": "false", "aria-controls": more.id, onclick: () => {
     more.hidden = !more.hidden;

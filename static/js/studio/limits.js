@@ -14,6 +14,7 @@ const STEERED_FRAMES = 10_000;
 
 /** Ranges that sliders offer; a number field takes the rest. Free choices around the useful values. */
 export const USUAL = {
+  "flocks": [1, 200], "pictures": [1, 500], "every": [1, 60], "backgrounds.plate": [0, 5], "backgrounds.color": [0, 5],
   "count": [1, 120], "frames": [30, 1800], "rules.separation": [0, 6], "rules.alignment": [0, 6], "rules.cohesion": [0, 4],
   "rules.walls": [0, 12], "rules.wander": [0, 4], "rules.circling": [0, 4], "rules.separation_bl": [0.1, 8],
   "rules.picture_separation_bl": [0, 4], "rules.alignment_bl": [0.1, 15], "rules.cohesion_bl": [0.1, 20], "rules.neighbors": [1, 64],

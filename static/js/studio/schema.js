@@ -6,7 +6,7 @@ import { proseLimits } from "./limits.js";
 
 /**
  * @typedef {{name: string, kind: "number" | "whole" | "boolean" | "choice" | "numbers" | "group" | "other", min: number, max: number,
- *   step: number, choices: string[], default: any, nullable: boolean, help: string}} Field
+ *   step: number, choices: string[], default: any, nullable: boolean, help: string, words?: string}} Field words: name of its words, if they are not its own
  * @typedef {Api.JsonSchema} Schema
  * @typedef {Map<string, Field>} Fields by name, with dots between levels
  */
@@ -24,7 +24,7 @@ function load() {
   return known;
 }
 
-/** Returns the fields of a flock, a virtual fish, or an analysis. @param {"Flock" | "Fish" | "Analysis"} [kind] @returns {Promise<Fields>} */
+/** Returns the fields of a flock, a virtual fish, a data set, or an analysis. @param {"Flock" | "Fish" | "Dataset" | "Analysis"} [kind] @returns {Promise<Fields>} */
 export async function loadFields(kind = "Flock") {
   const [schemas] = await Promise.all([load(), wordsOfService()]);
   return fieldsOf(schemas, `${kind}Params`, kind === "Analysis" ? "AnalysisOverrides" : `${kind}Request`);

@@ -124,7 +124,7 @@ async fn every_example_of_the_document_works_with_the_sample() {
     );
     let [footage, library, flock] = with_sample(&app).await;
     let examples = examples(&app.json("/openapi.json").await);
-    assert_eq!(examples.len(), 8);
+    assert_eq!(examples.len(), 11);
     for (method, path, example) in examples {
         let id = match path.split('/').nth(2) {
             Some("footage") => &footage,

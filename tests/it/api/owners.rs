@@ -14,7 +14,7 @@ use uuid::Uuid;
 use crate::common::TestApp;
 use crate::common::app::{json_of, routes};
 use crate::common::clip::TINY;
-use crate::common::results::{Results, id_in};
+use crate::common::results::{Results, dataset_of, id_in};
 
 /// How an operation accesses owned objects.
 enum Touch {
@@ -30,6 +30,32 @@ enum Touch {
 
 /// All operations. Those that delete come last, so that the others still find the owner's objects.
 fn table() -> Vec<(&'static str, &'static str, Touch)> {
+    of_datasets().into_iter().chain(of_the_rest()).collect()
+}
+
+fn of_datasets() -> Vec<(&'static str, &'static str, Touch)> {
+    use Touch::{Body, List, Path};
+    vec![
+        ("GET", "/v1/datasets", List),
+        ("GET", "/v1/datasets/{id}", Path("datasets")),
+        ("GET", "/v1/datasets/{id}/{file}", Path("datasets")),
+        ("PATCH", "/v1/datasets/{id}", Path("datasets")),
+        ("POST", "/v1/datasets", Body("library_ids", "libraries")),
+        (
+            "POST",
+            "/v1/datasets/estimate",
+            Body("library_ids", "libraries"),
+        ),
+        (
+            "POST",
+            "/v1/datasets/preview",
+            Body("library_ids", "libraries"),
+        ),
+        ("DELETE", "/v1/datasets/{id}", Path("datasets")),
+    ]
+}
+
+fn of_the_rest() -> Vec<(&'static str, &'static str, Touch)> {
     use Touch::{Body, List, Nothing, Path};
     vec![
         ("GET", "/v1/footage", List),
@@ -97,6 +123,7 @@ fn file_of(kind: &str) -> &'static str {
     match kind {
         "libraries" => "library.json",
         "flocks" => "flock.json",
+        "datasets" => "dataset.zip",
         _ => "video.mp4",
     }
 }
@@ -104,6 +131,7 @@ fn file_of(kind: &str) -> &'static str {
 /// Creates one object of every kind for the signed-in owner, with substitute results. Returns kinds and ids.
 async fn belongings(app: &TestApp) -> Vec<(&'static str, String)> {
     let results = Results::make(app, "film.mp4").await;
+    let dataset = dataset_of(app, &id_in(&results.library)).await;
     let upload = (app.post("/v1/uploads").header("tus-resumable", "1.0.0"))
         .header("upload-length", 9)
         .send();
@@ -114,6 +142,7 @@ async fn belongings(app: &TestApp) -> Vec<(&'static str, String)> {
         ("libraries", id_in(&results.library)),
         ("flocks", id_in(&results.flock)),
         ("fish", id_in(&results.fish)),
+        ("datasets", id_in(&dataset)),
         ("jobs", id_in(&results.analysis_job)),
     ]
 }
@@ -129,6 +158,7 @@ async fn response_of(
     let path = path.replace("{id}", id).replace("{file}", file_of(kind));
     let request = app.request(method.parse::<Method>().unwrap(), &path);
     let request = match touch {
+        Touch::Body(name @ "library_ids", _) => request.json(&json!({ *name: [id] })),
         Touch::Body(name, _) => request.json(&json!({ *name: id })),
         Touch::Path(_) if path.ends_with("/variants") => {
             let picture = write_rgb(&RgbImage::new(64, 64));
@@ -136,7 +166,7 @@ async fn response_of(
         }
         Touch::Path(_) if method == "POST" => request.json(&json!({})),
         Touch::Path("footage") if method == "PATCH" => request.json(&json!({"name": "x.mp4"})),
-        Touch::Path("libraries" | "flocks" | "fish") if method == "PATCH" => {
+        Touch::Path("libraries" | "flocks" | "fish" | "datasets") if method == "PATCH" => {
             request.json(&json!({"pinned": true}))
         }
         _ => request,
@@ -210,8 +240,9 @@ async fn foreign_id_gives_the_response_to_a_random_id() {
             // An object that the owner deleted is gone for the administrator too.
             let is_gone = *method == "DELETE" && allowed == &admin && status == 404;
             // A substitute library cannot be read.
-            let computed = ["/v1/flocks/preview", "/v1/flocks/{id}/school.glb"];
-            let is_substitute = computed.contains(path) && status == 500;
+            let is_drawn = *path == "/v1/flocks/preview" || path.starts_with("/v1/datasets");
+            let is_computed = is_drawn && method == &"POST" || path.ends_with("/school.glb");
+            let is_substitute = is_computed && status == 500;
             assert!(
                 status < 300 || status == 409 || is_gone || is_substitute,
                 "{method} {path}: {status} {body}"

@@ -14,7 +14,7 @@ use tokio::net::TcpStream;
 use crate::common::app::code_of;
 use crate::common::clip::SWIM;
 use crate::common::process::numbered_film;
-use crate::common::results::Results;
+use crate::common::results::{Results, dataset_of, id_in};
 use crate::common::{Place, TestApp};
 
 /// Longest wait for an effect that follows a response. Free choice.
@@ -221,6 +221,7 @@ async fn usage_tells_number_and_size_of_the_things_of_the_caller() {
     );
     app.sign_in(&owner);
     let results = Results::make(&app, "finch.mp4").await;
+    let dataset = dataset_of(&app, &id_in(&results.library)).await;
     let usage = app.json("/v1/usage").await;
     let mut used_bytes = 0;
     for (noun, path) in [
@@ -228,6 +229,7 @@ async fn usage_tells_number_and_size_of_the_things_of_the_caller() {
         ("libraries", &results.library),
         ("flocks", &results.flock),
         ("fish", &results.fish),
+        ("datasets", &dataset),
     ] {
         let size_bytes = app.json(path).await["size_bytes"].as_i64().unwrap();
         assert_eq!(usage[noun], json!({"n": 1, "size_bytes": size_bytes}));

@@ -25,6 +25,8 @@ pub(crate) struct TestApp {
     pub(crate) context: Context,
     pub(crate) client: Client,
     pub(crate) base: String,
+    /// Owner of the token that requests send, or the local one.
+    pub(crate) owner: Owner,
     place: Place,
     stop: CancellationToken,
     supervisor: Option<Supervisor>,
@@ -96,6 +98,7 @@ impl TestApp {
             context,
             client: client(),
             base,
+            owner: Owner::local(),
             place,
             stop,
             supervisor: None,
@@ -127,6 +130,9 @@ impl TestApp {
 
     /// Makes every later request send this token.
     pub(crate) fn sign_in(&mut self, token: &str) {
+        // A new token has an owner of its own, with its id.
+        let id = token.split('_').nth(1).unwrap_or_default();
+        self.owner = Owner(id.to_owned());
         let value = format!("Bearer {token}").parse().unwrap();
         let headers = HeaderMap::from_iter([(header::AUTHORIZATION, value)]);
         let client = Client::builder().default_headers(headers).build();
@@ -136,6 +142,7 @@ impl TestApp {
     /// Makes every later request go without a token.
     pub(crate) fn sign_out(&mut self) {
         self.client = client();
+        self.owner = Owner::local();
     }
 
     pub(crate) fn request(&self, method: Method, path: &str) -> RequestBuilder {

@@ -1,9 +1,13 @@
 //! Substitute results: a library, a flock and a virtual fish with the rows and files of real ones, but without
 //! their content. They are made at once.
 
+use flockreel::jobs::IdSequence;
+use flockreel::jobs::flock::dataset::job::Input;
 use flockreel::jobs::worker::{Step, Worker};
 use flockreel::store::footage::{Footage, VIDEO};
-use flockreel::store::owners::Owner;
+use flockreel::store::owners::{Account, Owner};
+use flockreel_core::dataset::Params;
+use flockreel_core::ids::LibraryId;
 use reqwest::StatusCode;
 use serde_json::{Value, json};
 use uuid::Uuid;
@@ -48,6 +52,29 @@ impl Results {
             analysis_job: format!("/v1/jobs/{}", id(&analysis["job_id"])),
         }
     }
+}
+
+/// Makes a substitute data set of a library, which is one that substitutes made or a real one. Returns its address.
+pub(crate) async fn dataset_of(app: &TestApp, library: &str) -> String {
+    let library_ids = vec![LibraryId(library.parse().unwrap())];
+    let input = Input {
+        library_ids: library_ids.clone(),
+        params: Params::default(),
+        licence: None,
+        source: None,
+    };
+    let account = Account {
+        owner: app.owner.clone(),
+        quota: None,
+    };
+    let (context, mut ids) = (&app.context, IdSequence::random());
+    let queued = context.enqueue(&input, None, &account, &mut ids).await;
+    let (_, id) = queued.unwrap();
+    let summary = json!({"library_ids": library_ids, "flocks": 1, "pictures": 1, "licence": null, "source": null});
+    let files = [("manifest.json", "{}"), ("entries", "PK")];
+    let worker = Worker::new(with_script(context, &done(&files, &summary)));
+    assert!(matches!(worker.step().await.unwrap(), Step::Done(_)));
+    format!("/v1/datasets/{id}")
 }
 
 /// Stores a film without an upload, and so without a poster, as versions without posters did. Returns its id.

@@ -1,6 +1,7 @@
 //! The life cycle of jobs: stepped by hand, run by worker pools, interrupted by kills, claimed concurrently.
 
 mod attempts;
+mod datasets;
 mod durable;
 mod full_disk;
 mod kills;

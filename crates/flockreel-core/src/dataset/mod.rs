@@ -4,6 +4,7 @@
 //! [`Plan::new`] draws for each flock its library, its parameters, its background and its camera ([`Look`]). All
 //! of it follows from the seed and the number of the flock, so each flock can be made without the others.
 
+mod dice; // random numbers of one flock
 mod look; // light, blur and noise of one camera
 mod params;
 mod plan; // what each flock shows

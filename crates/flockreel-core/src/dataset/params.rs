@@ -98,6 +98,7 @@ pub struct Params {
 
 /// Weights of the kinds of background; each flock has one kind.
 #[derive(Clone, Debug, PartialEq, SmartDefault, Serialize, Deserialize, ToSchema)]
+#[schema(as = DatasetBackgrounds)]
 #[serde(default, deny_unknown_fields)]
 pub struct Backgrounds {
     /// Background of the flock's own footage.
@@ -116,6 +117,7 @@ pub struct Backgrounds {
 
 /// Format of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[schema(as = DatasetPicture)]
 #[serde(rename_all = "snake_case")]
 pub enum Picture {
     /// JPEG.
@@ -136,6 +138,7 @@ impl Picture {
 
 /// Label files of a data set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[schema(as = DatasetFormat)]
 #[serde(rename_all = "snake_case")]
 pub enum Format {
     /// COCO with masks, boxes and keypoints, one file for each split.

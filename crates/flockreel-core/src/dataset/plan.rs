@@ -1,20 +1,23 @@
 //! Plan of a data set: the footage, the parameters and the look of each flock. A flock depends on the seed and on
-//! its number only, so the flocks before it may change.
+//! its number only, so the flocks before it may change, and each is planned when it is needed: the plan of a large data set
+//! is as small as that of a small one.
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::dice::{Choice, Dice};
 use super::{Look, Params};
 use crate::flock;
 use crate::flock::composite::params::Background;
 use crate::formats::params::{self, Error};
-use crate::random;
 
 /// All flocks of a data set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// The flocks, in order of their numbers.
-    pub sequences: Vec<Sequence>,
+    params: Params,
+    sizes_px: Vec<[u32; 2]>,
+    n_pictures: usize,
+    splits: Vec<Split>,
 }
 
 /// One flock of a data set.
@@ -71,49 +74,53 @@ pub enum Ground {
     Picture(usize),
 }
 
-/// Value of a flock that is drawn at random. Each has random numbers of its own.
-#[derive(Clone, Copy)]
-enum Choice {
-    Split,
-    Library,
-    Seed,
-    Count,
-    Preset,
-    Scale,
-    Background,
-    Picture,
-    Color,
-    Haze,
-    Shadow,
-    Gain,
-    Blur,
-    Noise,
-    Quality,
-    NoiseSeed,
-}
-
-/// Draws the random numbers of one flock.
-#[derive(Clone, Copy)]
-struct Dice {
-    seed: u64,
-    number: u32,
-}
-
 impl Plan {
     /// Plans a data set. `sizes_px` are the sizes of the footage of each library, at least one, and `n_pictures` is
     /// the number of background pictures. Fails if a flock's parameters are invalid.
+    ///
+    /// Whether they are depends on the preset, and on products of the number of individuals and of the size with others. So
+    /// the ends of these ranges are checked for each preset and library.
     pub fn new(params: &Params, sizes_px: &[[u32; 2]], n_pictures: usize) -> Result<Plan, Error> {
-        let splits = splits(params);
-        let sequence = |(number, split)| sequence(params, number, split, sizes_px, n_pictures);
-        let sequences = (0..params.flocks).zip(splits).map(sequence);
+        for preset in &params.presets {
+            for (count, scale) in params.count.iter().zip(params.scale) {
+                for size_px in sizes_px {
+                    checked(flock(params, preset, *count, 0, scaled(*size_px, scale))?)?;
+                }
+            }
+        }
         Ok(Plan {
-            sequences: sequences.collect::<Result<_, Error>>()?,
+            params: params.clone(),
+            sizes_px: sizes_px.to_vec(),
+            n_pictures,
+            splits: splits(params),
         })
+    }
+
+    /// Returns the number of flocks.
+    pub fn n_flocks(&self) -> usize {
+        self.splits.len()
+    }
+
+    /// Returns a flock, numbered from 0.
+    pub fn sequence(&self, number: usize) -> Sequence {
+        let split = self.splits[number];
+        let sequence = sequence(self, number as u32, split);
+        sequence.expect("the ends of all ranges were checked")
+    }
+
+    /// Returns the flocks in the order of their numbers.
+    pub fn sequences(&self) -> impl Iterator<Item = Sequence> + '_ {
+        (0..self.n_flocks()).map(|number| self.sequence(number))
+    }
+
+    /// Returns the subset of each flock.
+    pub fn split_of_each(&self) -> &[Split] {
+        &self.splits
     }
 
     /// Returns the names of the subsets that have flocks.
     pub fn splits(&self) -> Vec<&'static str> {
-        let has = |split: &Split| self.sequences.iter().any(|one| one.split == *split);
+        let has = |split: &Split| self.splits.contains(split);
         let splits = Split::ALL.into_iter().filter(has);
         splits.map(Split::name).collect()
     }
@@ -153,51 +160,67 @@ fn splits(params: &Params) -> Vec<Split> {
     splits
 }
 
-fn sequence(
-    params: &Params,
-    number: u32,
-    split: Split,
-    sizes_px: &[[u32; 2]],
-    n_pictures: usize,
-) -> Result<Sequence, Error> {
+fn sequence(plan: &Plan, number: u32, split: Split) -> Result<Sequence, Error> {
+    let (params, n_libraries) = (&plan.params, plan.sizes_px.len() as u64);
     let seed = params.seed;
     let dice = Dice { seed, number };
     // One library after the other, from a random one on, so that all are used alike.
-    let first = Dice { seed, number: 0 }.bits(Choice::Library, 0) % sizes_px.len() as u64;
-    let library = ((first + u64::from(number)) % sizes_px.len() as u64) as usize;
+    let first = Dice { seed, number: 0 }.bits(Choice::Library, 0) % n_libraries;
+    let library = ((first + u64::from(number)) % n_libraries) as usize;
     let preset = &params.presets[dice.pick(Choice::Preset, params.presets.len())];
-    let count = params.count.map(f64::from);
-    let mut overrides: Map<String, Value> = params.flock.clone();
-    let drawn = [
-        ("preset", Value::from(preset.as_str())),
-        ("count", Value::from(dice.whole(Choice::Count, count))),
-        (
-            "frames",
-            Value::from((params.pictures - 1) * params.every + 1),
-        ),
-        // Numbers above 2^53 are not exact in JSON files.
-        ("seed", Value::from(dice.bits(Choice::Seed, 0) >> 11)),
-    ];
-    overrides.extend(drawn.map(|(name, value)| (name.to_owned(), value)));
-    let mut flock: flock::Params = params::read(overrides)?;
+    let count = dice.whole(Choice::Count, params.count.map(f64::from));
     let scale = dice.uniform(Choice::Scale, params.scale);
-    let size_px = sizes_px[library].map(|side| (f64::from(side) * scale).round().max(16.0) as u32);
-    flock.render.size_px = Some(params.size_px.unwrap_or(size_px));
+    let size_px = scaled(plan.sizes_px[library], scale);
+    // Numbers above 2^53 are not exact in JSON files.
+    let seed = dice.bits(Choice::Seed, 0) >> 11;
+    let mut flock = flock(params, preset, count, seed, size_px)?;
     flock.render.haze_per_bl = dice.uniform(Choice::Haze, params.haze_per_bl);
     flock.render.shadow = (params.shadow).map(|range| dice.uniform(Choice::Shadow, range));
-    let (ground, background) = ground(params, &dice, n_pictures);
+    let (ground, background) = ground(params, &dice, plan.n_pictures);
     flock.render.background = background;
-    let checked = crate::parameters::Parameters::check(&flock);
-    checked.map_err(Error::Invalid)?;
     Ok(Sequence {
         number,
         split,
         library,
         preset: preset.clone(),
-        params: flock,
+        params: checked(flock)?,
         ground,
         look: look(params, &dice),
     })
+}
+
+/// Returns the parameters of a flock, without what is drawn of its scene.
+fn flock(
+    params: &Params,
+    preset: &str,
+    count: u32,
+    seed: u64,
+    size_px: [u32; 2],
+) -> Result<flock::Params, Error> {
+    let mut overrides: Map<String, Value> = params.flock.clone();
+    let drawn = [
+        ("preset", Value::from(preset)),
+        ("count", Value::from(count)),
+        (
+            "frames",
+            Value::from((params.pictures - 1) * params.every + 1),
+        ),
+        ("seed", Value::from(seed)),
+    ];
+    overrides.extend(drawn.map(|(name, value)| (name.to_owned(), value)));
+    let mut flock: flock::Params = params::read(overrides)?;
+    flock.render.size_px = Some(params.size_px.unwrap_or(size_px));
+    Ok(flock)
+}
+
+/// Returns a size times a factor, at least what a video may have.
+fn scaled(size_px: [u32; 2], scale: f64) -> [u32; 2] {
+    size_px.map(|side| (f64::from(side) * scale).round().max(16.0) as u32)
+}
+
+fn checked(flock: flock::Params) -> Result<flock::Params, Error> {
+    let result = crate::parameters::Parameters::check(&flock);
+    result.map_err(Error::Invalid).map(|()| flock)
 }
 
 fn ground(params: &Params, dice: &Dice, n_pictures: usize) -> (Ground, Background) {
@@ -228,37 +251,6 @@ fn look(params: &Params, dice: &Dice) -> Look {
     }
 }
 
-impl Dice {
-    fn bits(self, choice: Choice, k: u64) -> u64 {
-        random::bits(self.seed, &[u64::from(self.number), choice as u64, k])
-    }
-
-    /// Returns a number in [0, 1).
-    fn share(self, choice: Choice, k: u64) -> f64 {
-        random::uniform(self.seed, &[u64::from(self.number), choice as u64, k])
-    }
-
-    fn uniform(self, choice: Choice, [low, high]: [f64; 2]) -> f64 {
-        low + (high - low) * self.share(choice, 0)
-    }
-
-    /// Returns a whole number of a range, its ends included.
-    fn whole(self, choice: Choice, [low, high]: [f64; 2]) -> u32 {
-        (low + (high - low + 1.0) * self.share(choice, 0))
-            .floor()
-            .min(high) as u32
-    }
-
-    /// Returns a factor of a range, uniform in its logarithm.
-    fn factor(self, choice: Choice, k: u64, [low, high]: [f64; 2]) -> f64 {
-        low * libm::pow(high / low, self.share(choice, k))
-    }
-
-    fn pick(self, choice: Choice, n: usize) -> usize {
-        (self.bits(choice, 0) % n as u64) as usize
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -280,7 +272,7 @@ mod tests {
         let params = params(400);
         let plan = plan(&params);
         let all = |of: &dyn Fn(&Sequence) -> f64, [low, high]: [f64; 2]| {
-            let values: Vec<f64> = plan.sequences.iter().map(of).collect();
+            let values: Vec<f64> = plan.sequences().map(|one| of(&one)).collect();
             let (min, max) = values
                 .iter()
                 .fold((f64::MAX, f64::MIN), |(min, max), &value| {
@@ -296,8 +288,7 @@ mod tests {
         all(&|one| f64::from(one.look.jpeg_quality), [70.0, 95.0]);
         all(&|one| one.params.render.haze_per_bl, params.haze_per_bl);
         all(&|one| one.params.render.shadow.unwrap_or(9.0), [0.1, 0.3]);
-        let of =
-            |is: &dyn Fn(&Sequence) -> bool| plan.sequences.iter().filter(|one| is(one)).count();
+        let of = |is: &dyn Fn(&Sequence) -> bool| plan.sequences().filter(|one| is(one)).count();
         assert_eq!(of(&|one| one.library == 0), 200);
         let n_pictures = of(&|one| one.ground != Ground::FromParams);
         assert!((150..220).contains(&n_pictures), "{n_pictures}");
@@ -312,8 +303,8 @@ mod tests {
         let params = params(400);
         let plan = plan(&params);
         let shares = |of: &dyn Fn(&Sequence) -> f64, [low, high]: [f64; 2]| -> Vec<f64> {
-            let share = |one| (of(one) - low) / (high - low) - 0.5;
-            plan.sequences.iter().map(share).collect()
+            let share = |one| (of(&one) - low) / (high - low) - 0.5;
+            plan.sequences().map(share).collect()
         };
         let all = [
             shares(&|one| one.look.noise, params.noise),
@@ -334,10 +325,7 @@ mod tests {
     fn each_flock_has_one_split_and_the_shares_hold() {
         let count = |flocks, split| {
             let plan = plan(&params(flocks));
-            plan.sequences
-                .iter()
-                .filter(|one| one.split == split)
-                .count()
+            plan.sequences().filter(|one| one.split == split).count()
         };
         assert_eq!(Split::ALL.map(|split| count(40, split)), [32, 4, 4]);
         assert_eq!(Split::ALL.map(|split| count(4, split)), [2, 1, 1]);
@@ -345,15 +333,31 @@ mod tests {
     }
 
     #[test]
+    fn parameters_that_are_wrong_for_some_flocks_are_refused() {
+        let too_many = Params {
+            count: [1, 1000],
+            pictures: 5000,
+            ..Params::default()
+        };
+        assert!(Plan::new(&too_many, &[[640, 480]], 0).is_err());
+        let too_large = Params {
+            scale: [0.1, 4.0],
+            ..Params::default()
+        };
+        assert!(Plan::new(&too_large, &[[64, 48], [1920, 1080]], 0).is_err());
+        assert!(Plan::new(&too_large, &[[64, 48]], 0).is_ok());
+    }
+
+    #[test]
     fn a_flock_depends_on_the_seed_and_on_its_number_only() {
         let (few, many) = (plan(&params(10)), plan(&params(40)));
-        for (a, b) in few.sequences.iter().zip(&many.sequences) {
+        for (a, b) in few.sequences().zip(many.sequences()) {
             assert_eq!((&a.params, a.look, a.ground), (&b.params, b.look, b.ground));
         }
         let other = Params {
             seed: 2,
             ..params(10)
         };
-        assert!(plan(&other).sequences[0].params.seed != few.sequences[0].params.seed);
+        assert!(plan(&other).sequence(0).params.seed != few.sequence(0).params.seed);
     }
 }

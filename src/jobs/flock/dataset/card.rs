@@ -38,8 +38,8 @@ pub(super) fn write(dataset: &Dataset, manifest: &Manifest) -> String {
         seed = params.seed,
     );
     let mut by_split: BTreeMap<Split, u32> = BTreeMap::new();
-    for sequence in &dataset.plan.sequences {
-        *by_split.entry(sequence.split).or_default() += 1;
+    for split in dataset.plan.split_of_each() {
+        *by_split.entry(*split).or_default() += 1;
     }
     text += "\n| subset | flocks | pictures |\n| --- | --- | --- |\n";
     for (split, n) in by_split {

@@ -25,6 +25,16 @@ pub struct Record {
 }
 
 impl Record {
+    /// Returns the record of a file in a folder.
+    pub(super) fn of(folder: &Path, path: &str) -> io::Result<Record> {
+        let bytes = fs::read(folder.join(path))?;
+        Ok(Record {
+            path: path.to_owned(),
+            bytes: bytes.len() as u64,
+            sha256: hex(&Sha256::digest(&bytes)),
+        })
+    }
+
     /// Returns whether the file is in a folder, with its size.
     pub(super) fn is_in(&self, folder: &Path) -> bool {
         let file = fs::metadata(folder.join(&self.path));

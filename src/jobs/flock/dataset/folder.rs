@@ -75,7 +75,8 @@ impl Folder {
         &self.path
     }
 
-    fn work(&self, name: &str) -> PathBuf {
+    /// Returns the path of a file in the work folder.
+    pub(super) fn work(&self, name: &str) -> PathBuf {
         self.path.join(WORK).join(name)
     }
 
@@ -106,7 +107,7 @@ impl Folder {
         mut manifest: Manifest,
     ) -> Result<Manifest, FolderError> {
         let mut records = Vec::new();
-        for sequence in &dataset.plan.sequences {
+        for sequence in dataset.plan.sequences() {
             let bytes = fs::read(self.work(&format!("{}.json", sequence.name())))?;
             records.extend(serde_json::from_slice::<Vec<Record>>(&bytes)?);
         }
@@ -136,7 +137,7 @@ impl Folder {
         split: Split,
         manifest: &Manifest,
     ) -> Result<Option<Record>, FolderError> {
-        let sequences = dataset.plan.sequences.iter();
+        let sequences = dataset.plan.sequences();
         let names: Vec<String> = (sequences.filter(|one| one.split == split))
             .map(|one| one.name())
             .collect();

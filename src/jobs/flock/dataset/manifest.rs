@@ -121,7 +121,7 @@ impl Manifest {
     }
 
     pub(super) fn fill(&mut self, dataset: &Dataset, files: Vec<Record>) {
-        self.sequences = dataset.plan.sequences.iter().map(entry).collect();
+        self.sequences = dataset.plan.sequences().map(|one| entry(&one)).collect();
         self.files = files;
     }
 

@@ -4,9 +4,12 @@
 //! A flock is finished when its record is written. A data set that was stopped goes on with the first flock that
 //! has no record, so a stop redoes at most one flock.
 
+pub mod ahead; // what is told before it is made
+pub mod archive; // ZIP archive in pieces
 mod card; // README.md of the data set
 mod files; // files with their hashes
 pub mod folder; // the folder, with what a stopped run has finished
+pub mod job; // libraries -> data set, with parts that later attempts keep
 pub mod manifest; // what the data set was made from
 mod picture; // one picture with its labels
 mod scene; // a flock that is ready to be drawn
@@ -21,6 +24,7 @@ use self::manifest::Manifest;
 use self::scene::Scene;
 use crate::jobs::Error;
 use flockreel_core::dataset::{Params, Plan};
+use flockreel_core::formats::params;
 use flockreel_core::library::Library;
 use flockreel_core::progress::Progress;
 
@@ -79,14 +83,30 @@ pub enum MakeError {
 }
 
 impl Dataset {
+    /// Plans a data set. `backgrounds` are files of pictures. Fails if a flock's parameters are invalid.
+    pub fn new(
+        params: Params,
+        libraries: Vec<Library>,
+        backgrounds: Vec<PathBuf>,
+    ) -> Result<Dataset, params::Error> {
+        let sizes_px = libraries.iter().map(|library| library.poses.image_size_px);
+        let sizes_px: Vec<[u32; 2]> = sizes_px.collect();
+        Ok(Dataset {
+            plan: Plan::new(&params, &sizes_px, backgrounds.len())?,
+            params,
+            libraries,
+            backgrounds,
+        })
+    }
+
     /// Estimates the size from a few pictures.
     pub fn estimate(&self, progress: &dyn Progress) -> Result<Estimate, MakeError> {
         let n_pictures = u64::from(self.params.flocks) * u64::from(self.params.pictures);
         let (mut n_bytes, mut n_drawn, mut drawing_s) = (0, 0, 0.0);
-        let n_sequences = self.plan.sequences.len();
+        let n_sequences = self.plan.n_flocks();
         let n = n_sequences.min(N_ESTIMATED);
         for k in 0..n {
-            let sequence = &self.plan.sequences[k * n_sequences / n];
+            let sequence = &self.plan.sequence(k * n_sequences / n);
             let failed = |cause| MakeError::Flock {
                 number: sequence.number,
                 cause,
@@ -118,7 +138,7 @@ impl Dataset {
         manifest: Manifest,
         progress: &dyn Progress,
     ) -> Result<Made, MakeError> {
-        let n = self.plan.sequences.len();
+        let n = self.plan.n_flocks();
         if let Some(manifest) = manifest.finished_in(folder).map_err(FolderError::Io)? {
             folder::clean(folder)?;
             return Ok(Made {
@@ -128,7 +148,7 @@ impl Dataset {
         }
         let folder = Folder::open(folder, &manifest)?;
         let mut n_kept = 0;
-        for (k, sequence) in self.plan.sequences.iter().enumerate() {
+        for (k, sequence) in self.plan.sequences().enumerate() {
             let name = sequence.name();
             if folder.is_finished(&name)? {
                 n_kept += 1;
@@ -137,7 +157,7 @@ impl Dataset {
                     number: sequence.number,
                     cause,
                 };
-                let records = sequence::make(self, sequence, folder.path(), progress);
+                let records = sequence::make(self, &sequence, folder.path(), progress);
                 folder.finish_sequence(&name, &records.map_err(failed)?)?;
             }
             progress.report("drawing", (k + 1) as f64 / n as f64);

@@ -31,8 +31,8 @@ impl Dataset {
         let n_cells = SIDE * SIDE;
         let mut samples = Vec::new();
         for cell in 0..n_cells {
-            let n = self.plan.sequences.len();
-            let sequence = &self.plan.sequences[cell * n / n_cells];
+            let n = self.plan.n_flocks();
+            let sequence = &self.plan.sequence(cell * n / n_cells);
             let failed = |cause| MakeError::Flock {
                 number: sequence.number,
                 cause,

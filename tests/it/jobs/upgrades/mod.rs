@@ -172,6 +172,7 @@ async fn assert_results_are_served(app: &TestApp, schema: i64) {
         (4, "fish", 17, "video.mp4", RESULT),
         (12, "footage", 3, "file", FILM),
         (13, "footage", 4, "file", FILM),
+        (21, "datasets", 80, "manifest.json", RESULT),
     ] {
         if since > schema {
             continue;

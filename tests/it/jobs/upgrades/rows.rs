@@ -15,7 +15,7 @@ pub(super) const TOKEN: &str = "frl_00000000ann_abcdefghijklmnopqrstuvwxyzABCDEF
 pub(super) const LINK_KEY: [u8; 32] = [7; 32];
 
 /// Stored files: schema that has their row first, folder, name and content.
-pub(super) const FILES: [(i64, &str, &str, &[u8]); 9] = [
+pub(super) const FILES: [(i64, &str, &str, &[u8]); 11] = [
     (2, "footage/1", "video", FILM),
     (4, "libraries/13", "library.json", RESULT),
     (4, "libraries/13", "film.mp4", RESULT),
@@ -25,10 +25,12 @@ pub(super) const FILES: [(i64, &str, &str, &[u8]); 9] = [
     (12, "footage/3", "video", FILM),
     (13, "footage/4", "video", FILM),
     (19, "views/70", "film.mp4", FILM),
+    (21, "datasets/80", "manifest.json", RESULT),
+    (21, "datasets/82", "entries", RESULT),
 ];
 
 /// Schema and rows.
-pub(super) const ROWS: [(i64, &str); 16] = [
+pub(super) const ROWS: [(i64, &str); 17] = [
     (1, ""), // The rows of the stored files follow from FILES.
     (
         2,
@@ -133,5 +135,16 @@ pub(super) const ROWS: [(i64, &str); 16] = [
     (
         20,
         "update jobs set mends = '[]' where id = @21;",
+    ),
+    (
+        21,
+        "insert into jobs (id, kind, state, input, result_id, priority, run_at_ms, attempt, fence, created_ms, started_ms,
+            finished_ms) values
+            (@81, 'dataset', 'done', '{\"library_ids\": [\"@uuid13\"]}', @80, 0, 0, 1, 1, 8000, 8001, 8002);
+        insert into datasets (id, job_id, fence, folder, library_id, params, summary, size_bytes, created_ms, owner, used_ms)
+            values (@80, @81, 1, 'datasets/80', @13, '{}', '{\"library_ids\": [\"@uuid13\"],
+            \"flocks\": 1, \"pictures\": 1, \"licence\": null, \"source\": null}', 2, 8002, 'local', 8002);
+        insert into job_parts (job_id, number, folder, size_bytes, owner)
+            values (@81, 0, 'datasets/82', 2, 'local');",
     ),
 ];
