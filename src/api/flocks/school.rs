@@ -11,6 +11,7 @@ use crate::api::download::built;
 use crate::api::download::computed::{is_known, not_modified, tagged, with_type};
 use crate::api::extract::{Access, Conditions, Id, Query};
 use crate::api::problem::{Answer, Problem, ProblemBody};
+use crate::jobs::analysis::Summary as Measurement;
 use crate::jobs::flock::Summary;
 use crate::jobs::synchronous;
 use crate::store::resources::{Flock, Library};
@@ -22,6 +23,10 @@ const MEDIA_TYPE: &str = "model/gltf-binary";
 
 /// Largest product of individuals and frames of a school: about 30 MB.
 const MAX_POSTURES: u64 = 200_000;
+
+/// Largest number of frames of a film whose own animal is made during a request: about ten seconds of two cores, for which
+/// others wait.
+const MAX_FITTED_FRAMES: usize = 1200;
 
 /// Query parameters of a school.
 #[derive(Debug, Deserialize, IntoParams)]
@@ -40,7 +45,7 @@ pub(in crate::api) struct SchoolQuery {
 ///
 /// Each individual moves where the flock shows it, as the virtual animal (`/v1/fish`) moves in the frame that it shows. The
 /// file is computed for each request and sent whole. The number of individuals times `frames` is at most 200,000, else
-/// the call fails with `invalid_params`. It fails with `busy` if another computation does not end within 20 seconds, and
+/// the call fails with `invalid_params`. So does a school of the animal itself from a film of more than 1200 frames. It fails with `busy` if another computation does not end within 20 seconds, and
 /// with `animal_too_small` if no frame shows the whole animal: `body=goldfish` needs none.
 #[utoipa::path(get, path = "/v1/flocks/{id}/school.glb", params(("id" = Uuid, Path), SchoolQuery), responses(
     (status = 200, description = "the file", content_type = "model/gltf-binary"),
@@ -77,6 +82,14 @@ pub(in crate::api) async fn get_school(
         return not_modified(answer);
     }
     let library = access.find::<Library>(flock.library_id).await?;
+    let measured: Measurement = crate::api::stored(&library.summary)?;
+    if params.body == Body::Own && measured.n_frames > MAX_FITTED_FRAMES {
+        let sentence = format!(
+            "the animal of a film of more than {MAX_FITTED_FRAMES} frames takes longer than a request may: write the school with \
+             `flockreel fish --flock`, or ask for body=goldfish"
+        );
+        return Err(Problem::new(Code::InvalidParams, sentence));
+    }
     let (context, owner) = (&access.state.context, &access.caller.account.owner);
     let file = synchronous::school(context, owner, &library, &flock.folder, params).await?;
     let body = Bytes::from(file);

@@ -78,6 +78,24 @@ async fn scale_changes_centimetres_at_once_and_no_stored_file() {
         column(&row, "distance_cm"),
         [summary["distance_cm"].as_f64().unwrap()]
     );
+    let frames = app.json(&format!("{library}/motion.json")).await["frames"].clone();
+    assert_eq!(frames.as_array().unwrap().len(), text.lines().count() - 1);
+
+    let view = changed(&app, &library, json!({"px_per_cm": null})).await;
+    assert_eq!(
+        (&view["px_per_cm"], &view["length_cm"]),
+        (&Value::Null, &Value::Null)
+    );
+    assert_eq!(file(&app, &motion).await.0, without);
+    assert_eq!(etag_of(&poses).await, stored);
+    app.assert_sound().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn use_of_zones_is_part_of_a_summary() {
+    let (app, library, _) = with_library().await;
+    changed(&app, &library, json!({"px_per_cm": 8})).await;
+    let summary = app.json(&format!("{library}/summary.json")).await;
     let zones = "all:rect:-1,-1,9999,9999;none:ellipse:-9,-9,1,1";
     let zoned = app
         .json(&format!("{library}/summary.json?zones={zones}"))
@@ -99,16 +117,6 @@ async fn scale_changes_centimetres_at_once_and_no_stored_file() {
         code_of(wrong.send().await.unwrap(), 422).await,
         "invalid_params"
     );
-    let frames = app.json(&format!("{library}/motion.json")).await["frames"].clone();
-    assert_eq!(frames.as_array().unwrap().len(), text.lines().count() - 1);
-
-    let view = changed(&app, &library, json!({"px_per_cm": null})).await;
-    assert_eq!(
-        (&view["px_per_cm"], &view["length_cm"]),
-        (&Value::Null, &Value::Null)
-    );
-    assert_eq!(file(&app, &motion).await.0, without);
-    assert_eq!(etag_of(&poses).await, stored);
     app.assert_sound().await;
 }
 

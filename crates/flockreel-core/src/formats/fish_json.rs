@@ -1,4 +1,4 @@
-//! fish.json: the motion of a virtual fish and the measured beat of its tail (docs/reference/formats.md, "fish.json").
+//! fish.json: the motion of a virtual fish and the measured beat of its tail (docs/reference/formats.md, "Virtual fish").
 
 use serde::Serialize;
 
@@ -117,7 +117,7 @@ mod tests {
             bend_bl: 0.01,
             tail_tip_rad: -0.2,
             tail_tip_confidence: 0.8,
-            phase_turns: Some(0.25),
+            phase_turns: Some(0.1),
             phase_confidence: 0.9,
             side_confidence: 0.5,
         });
@@ -126,7 +126,7 @@ mod tests {
         assert_eq!(frames.len(), 2);
         assert!(frames[0]["tail_tip_rad"].is_null() && file["beat_hz"].is_null());
         assert_eq!(frames[1]["tail_tip_rad"], -0.2);
-        assert_eq!(frames[1]["phase_rad"], 1.5708);
+        assert_eq!(frames[1]["phase_rad"], 0.62832);
         assert_eq!(frames[1]["side_confidence"], 0.5);
     }
 }

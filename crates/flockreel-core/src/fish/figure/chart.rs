@@ -10,7 +10,7 @@ use crate::library::Pose;
 #[derive(Clone)]
 pub(super) enum Chart {
     /// Flat body seen from the side.
-    Flat(Flat),
+    Flat(Box<Flat>),
     /// Body bent along a midline seen from above.
     Curved {
         /// Midline of the frame.
@@ -74,12 +74,23 @@ impl Fit {
     pub(super) fn flat(&self, center_s: f64) -> Flat {
         let (sin_yaw, cos_yaw) = (libm::sin(self.yaw_rad), libm::cos(self.yaw_rad));
         let (sin, cos) = (libm::sin(self.pitch_rad), libm::cos(self.pitch_rad));
+        let along_px = [-cos_yaw * cos, -sin].map(|v| v * self.length_px);
+        let across_px = [-cos_yaw * sin, cos].map(|v| v * self.length_px);
+        let bent_px = SPINE.map(|parts| -sin_yaw * self.length_px * dot(&parts, &self.bend));
+        let det = along_px[0] * across_px[1] - along_px[1] * across_px[0];
+        let has_area = det.abs() > LEAST_AREA_PX;
         Flat {
             center_px: self.center_px,
             center_s,
-            along_px: [-cos_yaw * cos, -sin].map(|v| v * self.length_px),
-            across_px: [-cos_yaw * sin, cos].map(|v| v * self.length_px),
-            bent_px: SPINE.map(|parts| -sin_yaw * self.length_px * dot(&parts, &self.bend)),
+            along_px,
+            across_px,
+            unbent: if has_area {
+                unbent(&bent_px, across_px[1] / det)
+            } else {
+                [f64::NAN; N_SPINE]
+            },
+            bent_px,
+            det,
         }
     }
 
@@ -102,6 +113,10 @@ pub(super) struct Flat {
     across_px: [f64; 2],
     /// How far the bend moves points at even distances along the body to the right.
     bent_px: [f64; N_SPINE],
+    /// Where even distances along a straight body lie on the bent one.
+    unbent: [f64; N_SPINE],
+    /// Area of a square body length in the picture, square pixels, negative if it is mirrored.
+    det: f64,
 }
 
 impl Flat {
@@ -109,61 +124,63 @@ impl Flat {
     pub(super) fn image(&self, s: f64, t: f64) -> [f64; 2] {
         let ds = s - self.center_s;
         let at = |c: usize| self.center_px[c] + ds * self.along_px[c] + t * self.across_px[c];
-        [at(0) + self.bent_px(s)[0], at(1)]
+        [at(0) + self.bent_px(s), at(1)]
     }
 
-    /// Returns the body coordinates at an image point; `None` where the bent body folds, and for a body without
-    /// area.
+    /// Returns the body coordinates at an image point; `None` where the bent body folds, beyond its grids, and for a body
+    /// without area.
     pub(super) fn body_at(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let ([ax, ay], [bx, by]) = (self.along_px, self.across_px);
-        let det = ax * by - ay * bx;
-        if det.abs() < 1e-6 {
-            return None;
-        }
         let (dx, dy) = (x - self.center_px[0], y - self.center_px[1]);
-        // Straight, the point would lie at `from`; the bend solves s + pull bent(s) = from.
-        let from = self.center_s + (dx * by - dy * bx) / det;
-        let pull = by / det;
-        let mut s = from;
-        for _ in 0..N_STEPS {
-            let [bent, slope] = self.bent_px(s);
-            let steep = 1.0 + pull * slope;
-            if steep < LEAST_SLOPE {
-                return None;
-            }
-            let gap = from - s - pull * bent;
-            s += gap / steep;
-            if gap.abs() < EXACT {
-                break;
-            }
-        }
-        let [bent, _] = self.bent_px(s);
-        if (from - s - pull * bent).abs() > NEAR {
+        // A straight body would have the point at `from`.
+        let from = self.center_s + (dx * by - dy * bx) / self.det;
+        let at = (from - SPINE_FROM) * SPINE_PER_BL;
+        let k = at as usize;
+        if !(at >= 0.0 && k + 1 < N_SPINE) {
             return None;
         }
-        Some([s, (ax * dy - ay * (dx - bent)) / det])
+        let share = at - k as f64;
+        let s = self.unbent[k] + share * (self.unbent[k + 1] - self.unbent[k]);
+        if s.is_nan() {
+            return None;
+        }
+        Some([s, (ax * dy - ay * (dx - self.bent_px(s))) / self.det])
     }
 
-    /// Returns how far the bend moves a point to the right, pixels, and the change of that along the body.
-    fn bent_px(&self, s: f64) -> [f64; 2] {
+    /// Returns how far the bend moves a point to the right, pixels.
+    fn bent_px(&self, s: f64) -> f64 {
         let at = ((s - SPINE_FROM) * SPINE_PER_BL).clamp(0.0, N_SPINE as f64 - 1.001);
         let k = at as usize;
-        let step = self.bent_px[k + 1] - self.bent_px[k];
-        [
-            self.bent_px[k] + (at - k as f64) * step,
-            step * SPINE_PER_BL,
-        ]
+        self.bent_px[k] + (at - k as f64) * (self.bent_px[k + 1] - self.bent_px[k])
     }
 }
 
-/// Steps of Newton's method. Free choice; most points need 2.
-const N_STEPS: usize = 4;
+/// Returns for even distances along a straight body which point of the bent body is seen there: the solution of
+/// s + pull bent(s) = from. NaN where the body folds, and beyond its ends.
+fn unbent(bent_px: &[f64; N_SPINE], pull: f64) -> [f64; N_SPINE] {
+    let place = |k: usize| SPINE_FROM + k as f64 / SPINE_PER_BL;
+    let seen = |k: usize| place(k) + pull * bent_px[k];
+    let mut solved = [f64::NAN; N_SPINE];
+    let mut k = 0;
+    for (n, s) in solved.iter_mut().enumerate() {
+        let from = place(n);
+        while k + 2 < N_SPINE && seen(k + 1) < from {
+            k += 1;
+        }
+        let share = (from - seen(k)) / (seen(k + 1) - seen(k));
+        let steep = (seen(k + 1) - seen(k)) * SPINE_PER_BL;
+        if steep >= LEAST_SLOPE && (0.0..=1.0).contains(&share) {
+            *s = place(k) + share / SPINE_PER_BL;
+        }
+    }
+    solved
+}
+
 /// Least change of the image along the body, relative to a straight one: where it is 0, the body folds. Free choice.
 const LEAST_SLOPE: f64 = 0.1;
-/// Step at which the search ends, body lengths: far below a texel.
-const EXACT: f64 = 1e-4;
-/// Error along the body at which a point counts as found, body lengths. Free choice.
-const NEAR: f64 = 0.01;
+
+/// Least area of a square body length, square pixels: a body seen exactly from its end has none.
+const LEAST_AREA_PX: f64 = 1e-6;
 
 /// Displacements of the spine at even distances, for each part of the bend.
 static SPINE: LazyLock<[[f64; 3]; N_SPINE]> = LazyLock::new(|| {

@@ -209,21 +209,14 @@ impl Figure {
                 })
                 .collect();
             (self.beat_hz, bends) = course::bends(&evidence, poses.fps);
-            let again = |((fit, outline), (bend, side)): (
-                (&Option<Fit>, &Option<Outline>),
-                (&Bend, &f64),
-            )| {
+            let again = |k: usize| {
                 let bent = Fit {
-                    bend: (bend.mean * *side).to_array(),
-                    ..(*fit)?
+                    bend: (bends[k].mean * sides[k]).to_array(),
+                    ..fits[k]?
                 };
-                Some(outline.as_ref()?.place(sheet, center_s, &bent))
+                Some(outlines[k].as_ref()?.place(sheet, center_s, &bent))
             };
-            let frames = fits.par_iter().zip(&outlines);
-            fits = frames
-                .zip(bends.par_iter().zip(&sides))
-                .map(again)
-                .collect();
+            fits = (0..fits.len()).into_par_iter().map(again).collect();
         }
         self.bends = bends;
         // Poses in space are better than fits without perspective.
@@ -259,7 +252,7 @@ fn usual_length_px(fits: &[Fit]) -> Result<f64, Error> {
 
 fn charts(fits: &[Fit], center_s: f64) -> Vec<Chart> {
     fits.iter()
-        .map(|fit| Chart::Flat(fit.flat(center_s)))
+        .map(|fit| Chart::Flat(Box::new(fit.flat(center_s))))
         .collect()
 }
 
