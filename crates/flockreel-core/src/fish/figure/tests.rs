@@ -54,7 +54,7 @@ fn bent_body_is_mapped_there_and_back() {
     for at in [[0.05, 0.1], [0.4, -0.1], [0.9, 0.05]] {
         let [s, t] = flat.body_at(flat.image(at[0], at[1])).expect("no fold");
         assert!(
-            (s - at[0]).abs() < 1e-4 && (t - at[1]).abs() < 1e-4,
+            (s - at[0]).abs() < 1e-3 && (t - at[1]).abs() < 1e-3,
             "{at:?} {s} {t}"
         );
     }
