@@ -274,7 +274,7 @@ export default {
   "fish.title": "Virtual fish: {film}",
   "fish.what": "A 3-D model with the outline and the colors of the filmed animal swims as it does. Without a calibrated camera the depth is unknown, and the fish always turns around facing the camera.",
   "fish.what.top": "The film was taken from above, so the virtual animal shows its back and moves at one depth. It is a flat picture of the animal that bends along its midline; legs are part of the picture.",
-  "fish.none": "This film has no virtual fish yet. Making one draws every frame of the film, which takes a few minutes.", "fish.make": "Make the virtual fish", "fish.make.other": "Make this fish too",
+  "fish.none": "This film has no virtual fish yet. Making one draws every frame of the film, which takes a few minutes.", "fish.make": "Make the virtual fish", "fish.make.other": "Make this fish too", "fish.goldfish": "Make a goldfish that swims like it",
   "fish.left": "The film", "fish.right": "The virtual fish", "fish.wireframe": "Wireframe over the film", "fish.wireframe.label": "Wireframe of the virtual fish over the film",
   "fish.no_film": "This browser cannot play the film. Its background is shown.", "fish.no_webgl": "This browser has no WebGL 2, so the fish is shown as a film and cannot be turned.", "fish.film.label": "Film of the virtual fish",
   "fish.not_ours": "The 3-D model cannot be read. The film of the fish is shown.",

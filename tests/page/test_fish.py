@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 
 from conftest import CHROMIUM
 from service import post, wait_for_job
-from steps import fetch, until
+from steps import fetch, say, until
 
 pytestmark = pytest.mark.thorough
 
@@ -199,6 +199,24 @@ def test_another_fish_is_made_with_other_options_and_saved_under_a_human_name(gl
     gl_page.locator("tr[aria-current]").get_by_role("button", name="Delete").click()
     expect(gl_page.locator(".files tbody tr")).to_have_count(1)
     gl_page.goto("about:blank")
+
+
+def test_a_goldfish_is_offered_where_the_animal_is_too_small(page, fish):
+    open_fish(page, fish)
+    asked = []
+
+    def refuse(route):
+        asked.append(route.request.post_data_json)
+        code = "animal_too_small" if len(asked) == 1 else "queue_full"
+        route.fulfill(status=422, json={"code": code, "title": code, "detail": code, "advice": "", "mends": []})
+
+    page.route("**/v1/fish", refuse)
+    page.locator(".make-fish").click()
+    offer = page.get_by_role("button", name=say(page, "fish.goldfish"))
+    offer.click()
+    expect(page.locator(".make-state")).to_contain_text("queue_full")
+    expect(offer).to_have_count(0)
+    assert [one.get("body") for one in asked] == [None, "goldfish"]
 
 
 def test_without_webgl_the_film_of_the_fish_runs_in_step(page, fish):

@@ -44,23 +44,27 @@ export async function optionsBox({ library, params, life, onMade }) {
  * @param {{libraryId: string, settings: () => Api.FishParams, life: AbortSignal, onMade: (id: string) => void, isFirst?: boolean}} options
  */
 export function maker({ libraryId, settings, life, onMade, isFirst = false }) {
-  const button = element("button.make-fish", { type: "button", onclick: make }, say(isFirst ? "fish.make" : "fish.make.other"));
+  const button = element("button.make-fish", { type: "button", onclick: () => make() }, say(isFirst ? "fish.make" : "fish.make.other"));
   const state = element("div.make-state", { "aria-live": "polite" });
 
-  async function make() {
+  /** @param {Api.FishParams} [patch] changes of the settings */
+  async function make(patch) {
     button.disabled = true;
     try {
-      const { job_id } = await post("/v1/fish", { library_id: libraryId, ...settings() }, life);
+      const { job_id } = await post("/v1/fish", { library_id: libraryId, ...settings(), ...patch }, life);
       await expect(job_id);
       await follow(job_id);
     } catch (problem) {
       if (life.aborted) return;
       if (/** @type {any} */ (problem).name === "AbortError") state.replaceChildren();
-      else state.replaceChildren(problemBox(problem));
+      else state.replaceChildren(problemBox(problem, mendsOf(problem)));
       button.focus();
     }
     button.disabled = false;
   }
+
+  /** The goldfish needs no picture of the animal. @param {unknown} problem */
+  const mendsOf = (problem) => (/** @type {any} */ (problem).code === "animal_too_small" ? [{ label: say("fish.goldfish"), act: () => void make({ body: "goldfish" }) }] : []);
 
   /** Shows a job until it has ended. @param {string} jobId */
   async function follow(jobId) {
