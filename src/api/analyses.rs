@@ -1,7 +1,7 @@
 //! POST /v1/analyses: queues a job that measures a footage and makes a library. The request names stored footage, or its
 //! body is the video itself, which is then stored first.
 //!
-//! POST /v1/analyses/preview: what such a job would find in some frames, while the client waits.
+//! POST /v1/analyses/preview: finds the animal in some frames as such a job would, while the client waits.
 
 use axum::extract::{FromRequest, Request};
 use serde::{Deserialize, Serialize};
@@ -154,7 +154,7 @@ pub(super) async fn create_analysis(
     ))
 }
 
-/// What an analysis would find.
+/// Preview of an analysis.
 #[derive(Serialize, ToSchema)]
 pub(super) struct AnalysisPreview {
     /// At most 40 frames, spread evenly over the measured part of the film. Empty if the reason for a refusal hides the

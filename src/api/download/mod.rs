@@ -57,7 +57,7 @@ pub(super) struct Piece {
     pub file: BlobFile,
 }
 
-/// What is sent: stored files, one after the other. The last one identifies all of them.
+/// Content of a response: stored files, one after the other. The last one identifies all of them.
 #[derive(Clone, Debug)]
 pub(super) struct Sent {
     /// The files, at least one.

@@ -21,11 +21,10 @@ use flockreel_core::fish::{Body, Palette, Params};
 const NAME: &str = "school.glb";
 const MEDIA_TYPE: &str = "model/gltf-binary";
 
-/// Largest product of individuals and frames of a school: about 30 MB.
+/// Largest product of individuals and frames of a school. Free choice, as for previews of flocks.
 const MAX_POSTURES: u64 = 200_000;
 
-/// Largest number of frames of a film whose own animal is made during a request: about ten seconds of two cores, for which
-/// others wait.
+/// Largest number of frames of a film whose own animal is made during a request. Others wait meanwhile. Free choice.
 const MAX_FITTED_FRAMES: usize = 1200;
 
 /// Query parameters of a school.

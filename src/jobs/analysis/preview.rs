@@ -1,4 +1,4 @@
-//! A preview of an analysis: what it would find in some frames of the film, for a person who is choosing its parameters.
+//! Preview of an analysis: finds the animal in some frames of the film, for a person who is choosing parameters.
 //! A child process reads the film (docs/explanation/promises.md, "Bad input"). Nothing is stored.
 
 use std::path::Path;
@@ -24,7 +24,7 @@ const LONGEST_PX: u32 = 480;
 /// Length of an animal in these pictures below which the preview looks at the film as it is, pixels. Free choice.
 const LEAST_PX: f64 = 20.0;
 
-/// What an analysis would find in some frames.
+/// Preview of an analysis: the animal in some frames, and the verdict on the film.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Preview {
     /// The frames, in the order of time.

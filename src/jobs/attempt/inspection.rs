@@ -1,4 +1,4 @@
-//! The service's side of what a child process does for a request: it checks received files, or previews an analysis
+//! The service's side of two short tasks of a child process: the check of received files, and the preview of an analysis
 //! (docs/explanation/promises.md, "Bad input").
 
 use std::os::unix::process::ExitStatusExt;
@@ -30,7 +30,7 @@ pub(in crate::jobs) async fn inspect(context: &Context, draft: &Draft) -> Result
     }
 }
 
-/// Returns what an analysis of the footage in `files` would find. If the future is dropped, the child is killed.
+/// Previews an analysis of the footage in `files`. If the future is dropped, the child is killed.
 pub(in crate::jobs) async fn preview(
     context: &Context,
     files: Fetched,

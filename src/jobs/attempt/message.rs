@@ -17,7 +17,7 @@ use flockreel_core::ids::JobId;
 /// Everything that the child needs, except the folder for its files, which is its argument.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Order {
-    /// What to do.
+    /// Task of the child.
     pub(super) task: Task,
     /// Folders with the files of the footage or libraries that the task works on; none for a sample.
     pub(super) subjects: Vec<PathBuf>,
@@ -40,7 +40,7 @@ impl Order {
     }
 }
 
-/// What a child does.
+/// Task of a child process.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Task {
@@ -101,7 +101,7 @@ pub(super) enum End {
     Done(Product, Vec<File>),
     /// The received files are a film of this format.
     Inspected(Film),
-    /// The analysis would find this.
+    /// Preview of the analysis.
     Previewed(Preview),
     /// There is no result.
     Failed(Failure),

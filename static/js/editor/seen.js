@@ -1,4 +1,4 @@
-// What a preview of the measurement found: outlines on the picture of the film, and a strip of the frames it looked at.
+// Drawings of a preview of the measurement: outlines on the picture of the film, and a strip of the frames of the preview.
 // @ts-check
 import { drawnCanvas } from "../desk/canvas.js";
 

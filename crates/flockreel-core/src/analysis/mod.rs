@@ -75,7 +75,7 @@ pub fn analyze(
     Ok(library)
 }
 
-/// Returns what an analysis would find in about 40 frames of a footage, and whether it would refuse the footage.
+/// Finds the animal in about 40 frames of a footage, and decides whether [`analyze`] would refuse the footage.
 ///
 /// `source` may show the footage at `scale` times its size; the result is in pixels of the footage. This takes a
 /// fraction of the time of [`analyze`] and fails like it. A small picture hides small animals, and only [`analyze`] sees

@@ -1,5 +1,7 @@
-//! POST /v1/datasets: queues a job that makes a data set. What it would be is told before: its size by
-//! POST /v1/datasets/estimate, and samples by POST /v1/datasets/preview.
+//! POST /v1/datasets: queues a job that makes a data set.
+//!
+//! POST /v1/datasets/estimate returns the size of such a data set, and POST /v1/datasets/preview samples of it. Both make
+//! nothing.
 
 use axum::http::header;
 use axum::response::IntoResponse;

@@ -1,4 +1,4 @@
-//! What is told before a data set is made, while a client waits: its estimated size, and a sheet of samples.
+//! Estimated size of a data set and a sheet of samples, made while a client waits.
 
 use super::job::SHEET_QUALITY;
 use super::{Dataset, Estimate};

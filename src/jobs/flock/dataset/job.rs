@@ -150,7 +150,7 @@ impl Input {
     }
 }
 
-/// What an attempt works with: the files of one flock at a time, and what the finished flocks leave for the end.
+/// State of an attempt: the files of the current flock, and those entries of finished flocks that the end needs.
 struct Work<'a> {
     attempt: &'a Attempt<'a>,
     dataset: &'a Dataset,

@@ -1,4 +1,4 @@
-//! A preview of an analysis: what the samples of a film show of the animal, and whether the film would be refused.
+//! Preview of an analysis: the animal in the samples of a film, and the reason for which the film would be refused.
 
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
@@ -10,7 +10,7 @@ use crate::geometry::Rect;
 use crate::raster::outline;
 use crate::raster::runs::Component;
 
-/// What the samples show.
+/// The samples of a film with the animal in them, and the verdict on the film.
 #[derive(Debug)]
 pub struct Preview {
     /// The samples, in the order of time.
@@ -19,7 +19,7 @@ pub struct Preview {
     pub refused: Option<Error>,
 }
 
-/// What one frame shows.
+/// The animal and everything else that differs from the background, in one frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
 pub struct SeenFrame {
     /// Frame number in the film.
@@ -50,7 +50,7 @@ impl Preview {
     }
 }
 
-/// Returns what each sample shows.
+/// Returns the animal and the other components of each sample.
 pub(super) fn seen(samples: &Samples, survey: &Survey) -> Vec<SeenFrame> {
     let box_of = |component: &Component| {
         let rect = component.rect;

@@ -17,7 +17,7 @@ pub(in crate::fish) struct Bend {
     covariance: DMat3,
 }
 
-/// What one frame says of its bend: the inverse covariance, and that times the bend.
+/// Estimate of the bend by one frame: the inverse covariance, and the product of that and the bend.
 #[derive(Clone, Copy)]
 pub(in crate::fish) struct Evidence {
     pub(super) weight: DMat3,

@@ -1,5 +1,5 @@
-//! What the outline of one frame says of the bend: how the overlap of figure and matte changes with it (Gauss and
-//! Newton), whatever the place and direction near the fit.
+//! Estimate of the bend by the outline of one frame: one step of Gauss and Newton from the slopes of the overlap of figure
+//! and matte. Place and direction near the fit are left free.
 
 use glam::{DMat3, DVec3};
 
@@ -13,11 +13,10 @@ use super::grid::Sheet;
 const STEPS: [f64; 8] = [0.02, 0.02, 0.1, 0.05, 0.04, 0.1, 0.3, 0.3];
 /// Standard deviations of the first five around the fit. Free choice: about what the search leaves.
 const LOOSE: [f64; 5] = [0.03, 0.03, 0.15, 0.08, 0.05];
-/// Neighboring points of an outline err alike: this many count as one. Measured on samples: with 100 to 500 the
-/// phase is right in 19 of 20 frames.
+/// Neighboring points of an outline err alike: this many count as one. Free choice.
 const ALIKE: f64 = 300.0;
 
-/// Returns what the outline of a frame says of the bend.
+/// Returns the estimate of the bend by the outline of a frame.
 pub(super) fn evidence(fit: &Fit, outline: &Outline, sheet: &Sheet, center_s: f64) -> Evidence {
     let (rows, residuals) = slopes(fit, outline, sheet, center_s);
     let n = residuals.len().max(1) as f64;
