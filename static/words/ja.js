@@ -178,6 +178,8 @@ export default {
   "desk.number.endless": "無限に再生できる割合", "desk.number.endless.means": "遷移しながら無限に再生できる部分の割合。群れに使うのはこの部分だけ",
   "desk.advice": "計測の確認", "desk.advice.help": "計測時の判断と、よりよい動画のための助言です。誤った判断は各カードのボタンで直せます。", "desk.advice.picture": "該当する動画の画像", "desk.advice.playable": "無限に再生できる部分",
   "desk.advice.animal_too_small": "動物が小さすぎて切り抜けません。もっと近くから、または、より高い解像度で撮影してください。", "desk.advice.several_animals": "複数の動物が動いているため、最も大きい動物を追跡しました。1個体だけを撮影してください。",
+  "desk.advice.camera_unsteady": "画面全体が揺れているか、ピントが外れています（{n}回、最長は{from}～{to}秒）。カメラとピントを固定するか、その部分を除いて計測してください。",
+  "desk.advice.light_changes": "照明が変わっています（{n}回、最長は{from}～{to}秒）。大きく異なる照明での動物の姿は群れに使いません。",
   "desk.advice.never_leaves": "動物の一部がその場所を一度も離れないため、その下の背景を補いました。輪郭に動物全体が入っているか確認してください。動物が離れるまで撮影するか、動物のいない場面の画像を使ってください。",
   "desk.advice.foreign_frames": "{n}フレームが別の場面のため計測していません（最初は{first_s}秒）。その部分を除いてください。",
   "desk.advice.seldom_found": "動物が見つかったのは全フレームの{seen}です。動物が長く休んでいる場合は、動物を指定してください。それ以外の場合は、動物と明るさの異なる背景の前で、動物が画面から出ないように撮影してください。", "desk.advice.often_at_border": "動物がしばしば画面の端で切れています。もっと遠くから撮影してください。",

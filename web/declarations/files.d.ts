@@ -25,6 +25,7 @@ declare namespace Api {
     speed_bl_per_s?: number[] | null;
     first_foreign_s?: number | null;
     n_foreign_frames?: number;
+    disturbances?: { kind: string; from_s: number; to_s: number }[];
     kappa_used?: number | null;
   }
 

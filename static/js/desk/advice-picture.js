@@ -4,6 +4,7 @@
 import { element, svg } from "../app/element.js";
 import { say } from "../app/words.js";
 import { compassPicture } from "./compass.js";
+import { disturbed } from "./disturbed.js";
 import { framesOf } from "./instrument.js";
 
 /** Headings that an advice finds missing: middle and half width, degrees; 0 is right, 90 down. */
@@ -24,6 +25,8 @@ export function pictureOf(code, { desk, pictures, shoot }) {
   if (["little_playback", "no_transitions", "few_jumps"].includes(code) || code.startsWith("lacks_")) return playableBar(desk);
   if (code === "loose_jumps") return loosest(desk, pictures);
   if (code === "foreign_frames") return shoot({ frame: desk.frameOf(facts?.stats.first_foreign_s ?? 0), label });
+  const { longest } = disturbed(code, facts?.stats.disturbances);
+  if (longest) return shoot({ frame: desk.frameOf((longest.from_s + longest.to_s) / 2), label });
   if (code === "seldom_found") return shoot({ frame: frameWith((k) => !columns.detected[k]), label });
   if (code === "often_at_border") return shoot({ frame: frameWith((k) => columns.cut[k] === 1), label, hasMarks: true });
   if (code === "animal_too_small" || code === "several_animals" || code === "never_leaves" || code === "mostly_rests") return shoot({ frame: frameWith((k) => columns.detected[k] === 1), label, hasMarks: true });

@@ -4,6 +4,7 @@
 import { element } from "../app/element.js";
 import { percent, say, sayOr } from "../app/words.js";
 import { pictureOf } from "./advice-picture.js";
+import { disturbed } from "./disturbed.js";
 
 /**
  * Buttons that mend, by the code of the advice: settings to begin "Measure again" with, the tool to point with,
@@ -13,6 +14,8 @@ import { pictureOf } from "./advice-picture.js";
 const MENDS = {
   several_animals: { name: "point", tool: "animal_at" },
   foreign_frames: { name: "part", tool: "from_s" },
+  camera_unsteady: { name: "part", tool: "from_s" },
+  light_changes: { name: "part", tool: "from_s" },
   seldom_found: { name: "point", tool: "animal_at" },
   little_playback: { name: "looser", params: { kappa: 3 } },
   no_transitions: { name: "looser", params: { kappa: 3 } },
@@ -56,6 +59,8 @@ function adviceCard(desk, { code, sentence }, { pictures, shoot, acts }) {
 /** Returns the words of an advice with its figures, else the sentence of the service. @param {import("./instrument.js").Instrument} desk @param {string} code @param {string} sentence */
 function sentenceOf({ library, facts, start_s, end_s }, code, sentence) {
   const stats = facts.value?.stats ?? {};
+  const { n, longest } = disturbed(code, stats.disturbances);
+  if (longest) return say(`desk.advice.${code}`, { n, from: longest.from_s.toFixed(1), to: longest.to_s.toFixed(1) });
   const values = { seen: percent(library.detected_share), playable: percent(library.component_share), playable_s: library.component_share * (end_s - start_s), first_s: stats.first_foreign_s ?? 0, n: stats.n_foreign_frames ?? 0, times: stats.kappa_used ?? 0 };
   return sayOr(`desk.advice.${code}`, sentence.charAt(0).toUpperCase() + sentence.slice(1).replace(/([^.])$/, "$1."), values);
 }

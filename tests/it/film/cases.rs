@@ -1,7 +1,7 @@
 //! Common faults of films: the analysis copes with them, or refuses the film for the right reason.
 
-use flockreel_core::analysis::{Error, Params};
-use flockreel_core::library::MoverKind;
+use flockreel_core::analysis::{Error, Params, stats};
+use flockreel_core::library::{Disturbance, DisturbanceKind, MoverKind};
 
 use super::staged::{FPS, HEIGHT, N_FRAMES, Staged, WIDTH, put};
 
@@ -18,9 +18,46 @@ fn dimmed_switched_and_flickering_light_is_corrected() {
     let dimmed = |k: usize, _| 1.0 - 0.5 * (k as f64 / 75.0 - 0.5).clamp(0.0, 1.0);
     measured("dimmed", &Staged::plain().with_light(dimmed));
     let switched = |k: usize, _| if (50..110).contains(&k) { 0.4 } else { 1.0 };
-    measured("switched", &Staged::plain().with_light(switched));
+    let library = measured("switched", &Staged::plain().with_light(switched));
+    let other = disturbance(DisturbanceKind::Light, 50, 109);
+    assert_eq!(library.stats.disturbances, [other]);
     let banded = |k: usize, y: usize| 1.0 + 0.08 * (y as f64 / 25.0 + k as f64 * 1.3).sin();
     measured("mains", &Staged::plain().with_light(banded));
+}
+
+/// Returns the disturbance from one frame to another.
+fn disturbance(kind: DisturbanceKind, first: usize, last: usize) -> Disturbance {
+    Disturbance {
+        kind,
+        from_s: first as f64 / FPS,
+        to_s: last as f64 / FPS,
+    }
+}
+
+#[test]
+fn shaking_camera_is_told_with_its_times_and_is_no_mover() {
+    let shake = |k: usize| match k {
+        100..130 => [5 + 2 * (k as i64 % 3), 4 - 3 * (k as i64 % 2)],
+        _ => [0, 0],
+    };
+    let library = Staged::plain()
+        .shifted(shake)
+        .analyzed(&Params::default())
+        .unwrap();
+    let shaken = disturbance(DisturbanceKind::Camera, 100, 129);
+    assert_eq!(library.stats.disturbances, [shaken]);
+    assert_eq!(library.poses.other_movers, []);
+    let advice = stats::advice(&library, &Params::default());
+    let sentence = advice
+        .iter()
+        .find(|advice| advice.code() == "camera_unsteady")
+        .unwrap();
+    assert!(
+        sentence
+            .to_string()
+            .contains("from 3.3 to 4.3 s: fix the camera"),
+        "{sentence}"
+    );
 }
 
 #[test]

@@ -125,6 +125,7 @@ fn analyze_part(
     let mut poses = pose::measure(&track.frames, view, &source.format(), params);
     poses.view_confidence = view_confidence;
     poses.other_movers = std::mem::take(&mut track.movers);
+    let disturbances = std::mem::take(&mut track.disturbances);
     midline::trace(&mut poses, &track);
     poses.tail_beat = midline::tail_beat::measure(&poses);
     let sprites = if animal_too_small {
@@ -148,6 +149,7 @@ fn analyze_part(
         several_animals: scene.several_animals,
         n_foreign_frames: foreign_times_s.len(),
         first_foreign_s: foreign_times_s.first().copied(),
+        disturbances,
         animal_too_small,
         ..stats::library_stats(&poses, &connections)
     };

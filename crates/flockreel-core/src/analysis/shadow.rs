@@ -341,6 +341,7 @@ mod tests {
             Track {
                 frames,
                 movers: Vec::new(),
+                disturbances: Vec::new(),
                 scratch: Arc::clone(&scratch),
             },
             background,

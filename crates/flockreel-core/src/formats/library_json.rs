@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::disturbance::DisturbanceFile;
 use crate::analysis::Params;
 use crate::analysis::stats::{Advice, advice};
 use crate::geometry::rounded;
@@ -263,6 +264,8 @@ struct StatsFile {
     n_foreign_frames: usize,
     #[serde(default)]
     first_foreign_s: Option<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    disturbances: Vec<DisturbanceFile>,
     #[serde(default)]
     animal_too_small: bool,
     n_candidates: u64,
@@ -314,6 +317,11 @@ impl StatsFile {
             several_animals: stats.several_animals,
             n_foreign_frames: stats.n_foreign_frames,
             first_foreign_s: stats.first_foreign_s.map(decimals(3)),
+            disturbances: stats
+                .disturbances
+                .iter()
+                .map(DisturbanceFile::new)
+                .collect(),
             animal_too_small: stats.animal_too_small,
             n_candidates: stats.n_candidates,
             n_transitions: stats.n_transitions,
@@ -336,6 +344,9 @@ impl StatsFile {
             several_animals: self.several_animals,
             n_foreign_frames: self.n_foreign_frames,
             first_foreign_s: self.first_foreign_s,
+            disturbances: (self.disturbances.into_iter())
+                .map(DisturbanceFile::into_disturbance)
+                .collect(),
             animal_too_small: self.animal_too_small,
             n_candidates: self.n_candidates,
             n_transitions: self.n_transitions,

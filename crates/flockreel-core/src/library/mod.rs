@@ -114,6 +114,26 @@ pub enum MoverKind {
     Other,
 }
 
+/// A time in which the whole picture does not show the scene as it does in most frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disturbance {
+    /// What changes the picture.
+    pub kind: DisturbanceKind,
+    /// Time at which it begins, seconds.
+    pub from_s: f64,
+    /// Time at which it ends, seconds.
+    pub to_s: f64,
+}
+
+/// What changes the whole picture for a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DisturbanceKind {
+    /// The camera shakes, or its focus hunts.
+    Camera,
+    /// The light is another one.
+    Light,
+}
+
 /// Counts and shares that describe the quality of a library.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct LibraryStats {
@@ -134,6 +154,8 @@ pub struct LibraryStats {
     pub n_foreign_frames: usize,
     /// Time of the first such frame, seconds; null if there is none.
     pub first_foreign_s: Option<f64>,
+    /// Times in which the camera shakes, or the light is another one; in order of time for each kind.
+    pub disturbances: Vec<Disturbance>,
     /// Whether the animal covers too few pixels for sprites. The library then holds poses only.
     pub animal_too_small: bool,
     /// Number of pairs of clips with D < epsilon that may be joined, before the selection of local minima.

@@ -65,6 +65,11 @@ impl Light {
         self.line_factors.is_some()
     }
 
+    /// Returns whether a channel's gain differs from 1 by more than `share`.
+    pub fn is_other_by(&self, share: f32) -> bool {
+        self.rgb.iter().any(|gain| (gain - 1.0).abs() > share)
+    }
+
     /// Returns the luma factor at a pixel in addition to the gain; 1 where the light is even.
     pub fn factor(&self, x: usize, y: usize) -> f32 {
         let at_pixel = |factors: &LineFactors| factors.rows[y] * factors.columns[x];

@@ -10,11 +10,12 @@
 //! 5. `refusal` rejects footage that cannot become a library, before any frame is tracked.
 
 use super::matte::{self, Coat};
-use super::silhouette;
+use super::silhouette::{self, blocks::Proposals};
 use super::subject::Subject;
 use super::{Error, Params};
 use crate::footage::FrameSource;
 use crate::geometry::Rect;
+use crate::library::DisturbanceKind;
 use crate::progress::Progress;
 use crate::raster::{Frame, RgbImage};
 
@@ -46,8 +47,12 @@ use refusal::SimilarObjects;
 use samples::{MAX_SAMPLES, Samples};
 use survey::Survey;
 
-/// Largest share of blocks that may differ where a frame shows a background's scene, 0..=1. Free choice.
+/// Largest share of blocks that may differ where a frame shows a background's scene, and of the background's edges
+/// where the camera is steady, 0..=1. Free choice.
 const MAX_DIFFERING_SHARE: f64 = 0.5;
+/// Deviation of a frame's gain from 1 above which its light is told as another one. Free choice: automatic exposure
+/// stays below it.
+const OTHER_LIGHT: f32 = 0.2;
 /// Number of times that still parts of the animal are taken out of the backgrounds. Free choice: it bounds the
 /// time.
 const MAX_REPAIRS: usize = 3;
@@ -91,6 +96,8 @@ pub struct Placed<'a> {
     pub light: Light,
     /// Boxes of the picture that may differ from the background.
     pub boxes: Vec<Rect>,
+    /// What keeps the frame from showing the scene as most frames do.
+    pub disturbance: Option<DisturbanceKind>,
 }
 
 impl Scene {
@@ -138,6 +145,7 @@ impl Scene {
                 background: &self.backgrounds[0],
                 light: Light::NEUTRAL,
                 boxes: Vec::new(),
+                disturbance: None,
             });
         }
         let after = self.samples.partition_point(|(at, _)| *at < frame_idx);
@@ -163,14 +171,25 @@ impl Scene {
     fn compare(&self, background_idx: usize, frame: &Frame) -> (Placed<'_>, f64) {
         let background = &self.backgrounds[background_idx];
         let light = light::measure(frame, background);
-        let (boxes, share) = background
-            .blocks
-            .proposals(frame, &light, silhouette::MARGIN_PX);
+        let blocks = &background.blocks;
+        let Proposals {
+            boxes,
+            share,
+            edge_share,
+        } = blocks.proposals(frame, &light, silhouette::MARGIN_PX);
+        let is_lit_differently =
+            background.light != self.backgrounds[0].light || light.is_other_by(OTHER_LIGHT);
+        let disturbance = match () {
+            () if edge_share > MAX_DIFFERING_SHARE => Some(DisturbanceKind::Camera),
+            () if is_lit_differently => Some(DisturbanceKind::Light),
+            () => None,
+        };
         let placed = Placed {
             background_idx,
             background,
             light,
             boxes,
+            disturbance,
         };
         (placed, share)
     }

@@ -6,12 +6,14 @@
 
 use super::mirror::{MIN_RANGE, Mirror};
 use super::samples::Samples;
+use super::states::thumbnail::Thumbnail;
 use super::survey::Survey;
 use crate::analysis::params::Follow;
 use crate::analysis::subject::{FITS, Look, MIN_AREA_PX, Subject};
 use crate::analysis::{Error, Params};
 use crate::geometry::Rect;
 use crate::order;
+use crate::raster::Frame;
 
 /// Least share of the samples in which the animal must be found, 0..=1. Free choice.
 const MIN_FOUND_SHARE: f64 = 0.05;
@@ -35,6 +37,13 @@ pub(super) enum SimilarObjects {
     MirrorImage(Mirror),
     /// Other animals.
     Animals,
+}
+
+/// Returns whether two frames differ in most of the picture. Only another light changes the still parts too.
+fn differs_all_over(a: &Frame, b: &Frame) -> bool {
+    let [a, b] = [a, b].map(Thumbnail::new);
+    let n_differing = (0..a.len()).filter(|&cell| a.differs_at(&b, cell)).count();
+    2 * n_differing > a.len()
 }
 
 /// Checks footage by the survey of its samples; fails with the reason to refuse it. Returns the objects that
@@ -72,11 +81,18 @@ fn check_scene(survey: &Survey, samples: &Samples, subject: &Subject) -> Result<
         .filter(|&k| other_area_px(k) > MAX_AREA_SHARE * n_px)
         .collect();
     if busy.len() as f64 > FREQUENT_SHARE * n_samples {
+        let at_s = samples.time_s(busy[0]);
+        let calm = (0..survey.looks.len()).find(|k| !busy.contains(k));
+        if calm
+            .is_some_and(|calm| differs_all_over(&samples.frames[busy[0]], &samples.frames[calm]))
+        {
+            return Err(Error::LightChanges { at_s });
+        }
         let looks = survey.looks[busy[0]].iter().enumerate();
         let others = looks.filter(|(at, _)| survey.animal[busy[0]] != Some(*at));
         let boxes = others.map(|(_, look)| look.box_px);
         return Err(Error::BackgroundNotStatic {
-            at_s: samples.time_s(busy[0]),
+            at_s,
             box_px: boxes.reduce(|all, one| all.union(&one)),
         });
     }
@@ -170,4 +186,31 @@ fn gap_px(a: &Rect, b: &Rect) -> u32 {
     let apart =
         |a0: u32, a1: u32, b0: u32, b1: u32| b0.saturating_sub(a1).max(a0.saturating_sub(b1));
     apart(a.x, a.right(), b.x, b.right()).max(apart(a.y, a.bottom(), b.y, b.bottom()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::ColorSpec;
+
+    #[test]
+    fn only_another_light_differs_all_over() {
+        let mut scene = Frame::new(320, 240, ColorSpec::default());
+        for (at, value) in scene.planes[..320 * 240].iter_mut().enumerate() {
+            *value = if (at % 320 / 40 + at / 320 / 40) % 2 == 0 {
+                60
+            } else {
+                160
+            };
+        }
+        let mut bluer = scene.clone();
+        bluer.planes[320 * 240..][..160 * 120].fill(145);
+        assert!(differs_all_over(&scene, &bluer));
+        let mut moved = scene.clone();
+        moved.planes[..320 * 240].rotate_left(8);
+        assert!(!differs_all_over(&scene, &moved));
+        let mut crossed = scene.clone();
+        crossed.planes[..320 * 80].fill(220);
+        assert!(!differs_all_over(&scene, &crossed));
+    }
 }

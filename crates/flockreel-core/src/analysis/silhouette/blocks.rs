@@ -29,6 +29,17 @@ pub struct Blocks {
     thresholds: Vec<[i16; 3]>,
 }
 
+/// The parts of a frame that differ from the background.
+#[derive(Debug, PartialEq)]
+pub struct Proposals {
+    /// The boxes that need a comparison pixel by pixel, by row, then by column.
+    pub boxes: Vec<Rect>,
+    /// Share of all blocks that differ, 0..=1.
+    pub share: f64,
+    /// Share of the blocks with an edge of the background that differ, 0..=1.
+    pub edge_share: f64,
+}
+
 impl Blocks {
     /// Returns the block sums of a background image, with the least thresholds.
     pub fn new(background: &Frame) -> Blocks {
@@ -96,29 +107,41 @@ impl Blocks {
             });
     }
 
-    /// Returns the boxes that need a comparison pixel by pixel, and the share of all blocks that differ,
-    /// 0..=1.
+    /// Returns the parts of a frame that need a comparison pixel by pixel.
     ///
     /// The boxes surround connected differing blocks, widened by `margin_px`. Overlapping boxes are merged.
-    pub fn proposals(&self, frame: &Frame, light: &Light, margin_px: u32) -> (Vec<Rect>, f64) {
+    pub fn proposals(&self, frame: &Frame, light: &Light, margin_px: u32) -> Proposals {
         let [width, height] = [frame.width, frame.height];
-        let differing = self.differing(frame, light);
-        let n_differing: u64 = differing.iter().map(|c| c.area).sum();
-        let share = n_differing as f64 / self.sums.len() as f64;
-        let widened = |rect: &Rect| rect.inflated(margin_px, width, height);
-        (
-            merge_overlapping(
-                differing
-                    .iter()
-                    .map(|c| widened(&box_in_pixels(c.rect)))
-                    .collect(),
-            ),
-            share,
-        )
+        let mask = self.differing(frame, light);
+        let widened = |c: &Component| box_in_pixels(c.rect).inflated(margin_px, width, height);
+        Proposals {
+            boxes: merge_overlapping(runs::components(&mask).iter().map(widened).collect()),
+            share: mask.area() as f64 / self.sums.len() as f64,
+            edge_share: self.edge_share(&mask),
+        }
     }
 
-    /// Returns the connected components of differing blocks, in units of blocks.
-    fn differing(&self, frame: &Frame, light: &Light) -> Vec<Component> {
+    /// Returns the share of the background's edges that differ, 0..=1: the larger one of upright and level edges. An
+    /// edge lies where a picture moved by one block would differ. Edges shorter together than the picture do not
+    /// count, because the animal alone could cover them.
+    fn edge_share(&self, differing: &Mask) -> f64 {
+        let last_row = self.sums.len() - self.columns;
+        let share = |step: usize, least: usize, has_next: &dyn Fn(usize) -> bool| {
+            let is_edge = |&at: &usize| {
+                let gap = |next: usize| (self.sums[next][0] - self.sums[at][0]).abs();
+                has_next(at) && gap(at + step) > self.thresholds[at][0]
+            };
+            let edges: Vec<usize> = (0..self.sums.len()).filter(is_edge).collect();
+            let n_differing = edges.iter().filter(|&&at| differing.bits[at] > 0).count();
+            n_differing as f64 / edges.len().max(least) as f64
+        };
+        let upright = share(1, self.rows, &|at| (at + 1) % self.columns > 0);
+        let level = share(self.columns, self.columns, &|at| at < last_row);
+        upright.max(level)
+    }
+
+    /// Returns the mask of the differing blocks, in units of blocks.
+    fn differing(&self, frame: &Frame, light: &Light) -> Mask {
         let mut mask = Mask::new(Rect::of_size(self.columns as u32, self.rows as u32));
         let mut sums = vec![[0; 3]; self.columns];
         let inverse_gain = 1024.0 / light.luma();
@@ -150,7 +173,7 @@ impl Blocks {
                 *bit = u8::from(differs);
             }
         }
-        runs::components(&mask)
+        mask
     }
 }
 
@@ -234,9 +257,9 @@ mod tests {
                 frame.planes[y * 61 + x] = 140;
             }
         }
-        let (found, share) = blocks.proposals(&frame, &Light::NEUTRAL, 0);
+        let found = blocks.proposals(&frame, &Light::NEUTRAL, 0);
         assert_eq!(
-            found,
+            found.boxes,
             [Rect {
                 x: 40,
                 y: 20,
@@ -244,10 +267,31 @@ mod tests {
                 h: 4
             }]
         );
-        assert!((share - 2.0 / (16.0 * 12.0)).abs() < 1e-9);
-        assert_eq!(
-            blocks.proposals(&background, &Light::NEUTRAL, 0),
-            (vec![], 0.0)
+        assert!((found.share - 2.0 / (16.0 * 12.0)).abs() < 1e-9);
+        let nothing = blocks.proposals(&background, &Light::NEUTRAL, 0);
+        assert_eq!((nothing.boxes, nothing.share), (vec![], 0.0));
+    }
+
+    #[test]
+    fn edges_of_a_moved_picture_differ() {
+        let [mut background, mut moved] = [0, 1].map(|_| Frame::new(64, 48, ColorSpec::default()));
+        let tile = |x: usize, y: usize| if (x / 16 + y / 12) % 2 == 0 { 60 } else { 180 };
+        for (at, (still, moved)) in background.planes[..64 * 48]
+            .iter_mut()
+            .zip(&mut moved.planes[..64 * 48])
+            .enumerate()
+        {
+            (*still, *moved) = (tile(at % 64, at / 64), tile(at % 64 + 4, at / 64));
+        }
+        let blocks = Blocks::new(&background);
+        let share_of = |frame: &Frame| blocks.proposals(frame, &Light::NEUTRAL, 0).edge_share;
+        assert_eq!(share_of(&moved), 1.0);
+        let mut covered = background.clone();
+        covered.planes[..64 * 12].fill(120); // a quarter of the picture, with a quarter of its edges
+        assert!(
+            (0.2..0.4).contains(&share_of(&covered)),
+            "{}",
+            share_of(&covered)
         );
     }
 

@@ -35,7 +35,7 @@ pub fn components(
     light: &Light,
     ignored: &[Rect],
 ) -> Vec<Component> {
-    let (boxes, _) = background.blocks.proposals(frame, light, MARGIN_PX);
+    let boxes = background.blocks.proposals(frame, light, MARGIN_PX).boxes;
     components_in_boxes(frame, background, light, boxes, ignored)
 }
 

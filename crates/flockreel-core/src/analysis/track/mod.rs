@@ -33,7 +33,7 @@ use super::silhouette::{self, tether};
 use super::subject::{Look, MIN_AREA_PX};
 use super::{Error, MIN_FRAMES, Params};
 use crate::geometry::Rect;
-use crate::library::Mover;
+use crate::library::{Disturbance, DisturbanceKind, Mover};
 use crate::order;
 use crate::progress::Progress;
 use crate::raster::runs::Component;
@@ -73,6 +73,8 @@ pub struct Track {
     pub frames: Vec<Tracked>,
     /// Things other than the animal that moved.
     pub movers: Vec<Mover>,
+    /// Times in which the camera shakes, or the light is another one.
+    pub disturbances: Vec<Disturbance>,
     /// Storage of the mattes' pixels.
     pub scratch: Arc<dyn Scratch>,
 }
@@ -96,6 +98,7 @@ impl Track {
 struct FrameResult {
     time_s: f64,
     background_idx: Option<usize>,
+    disturbance: Option<DisturbanceKind>,
     candidates: Vec<Candidate>,
     movers: Vec<MoverSighting>,
 }
@@ -153,6 +156,8 @@ pub fn follow(
     });
     let times_s: Vec<f64> = results.iter().map(|r| r.time_s).collect();
     let movers = movers::gather(&movers.collect::<Vec<_>>(), &times_s);
+    let disturbed: Vec<_> = results.iter().map(|result| result.disturbance).collect();
+    let disturbances = movers::disturbances(&disturbed, &times_s);
     let is_whole = confidence::that_whole(scene.still_px > 0);
     let tracked = results.into_iter().zip(chosen);
     let tracked = tracked.map(|(result, chosen)| {
@@ -167,6 +172,7 @@ pub fn follow(
     Ok(Track {
         frames,
         movers,
+        disturbances,
         scratch,
     })
 }
@@ -222,13 +228,17 @@ fn compare(
         return Ok(FrameResult {
             time_s,
             background_idx: None,
+            disturbance: None,
             candidates: Vec::new(),
             movers: Vec::new(),
         });
     };
     let ignored = params.ignored_at(time_s, [frame.width, frame.height]);
     let components = components(frame, &placed, scene, &ignored);
-    let (described, movers) = described(components, frame, &placed, scene);
+    let (described, mut movers) = described(components, frame, &placed, scene);
+    if placed.disturbance == Some(DisturbanceKind::Camera) {
+        movers.clear(); // they are edges of the scene
+    }
     let view = FrameView {
         view: matte::View {
             frame,
@@ -269,6 +279,7 @@ fn compare(
     Ok(FrameResult {
         time_s,
         background_idx: Some(placed.background_idx),
+        disturbance: placed.disturbance,
         candidates,
         movers,
     })

@@ -5,7 +5,7 @@
 
 use crate::analysis::subject::{FITS, Look, Subject};
 use crate::geometry::Rect;
-use crate::library::{Mover, MoverKind};
+use crate::library::{Disturbance, DisturbanceKind, Mover, MoverKind};
 
 /// Least duration of a mover, seconds. Free choice.
 const MIN_DURATION_S: f64 = 0.3;
@@ -136,6 +136,31 @@ pub(super) fn gather(frames: &[Vec<MoverSighting>], times_s: &[f64]) -> Vec<Move
         .collect();
     movers.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
     movers
+}
+
+/// Returns the times of another light or an unsteady camera, from that of each frame. They last as long as movers.
+pub(super) fn disturbances(
+    frames: &[Option<DisturbanceKind>],
+    times_s: &[f64],
+) -> Vec<Disturbance> {
+    let whole = MoverSighting {
+        box_px: Rect::of_size(1, 1),
+        on_border: false,
+        is_like_animal: false,
+        is_image: false,
+    };
+    let of_kind = |kind: DisturbanceKind| {
+        let seen = frames.iter().map(|&frame| match frame == Some(kind) {
+            true => vec![whole.clone()],
+            false => Vec::new(),
+        });
+        let spans = gather(&seen.collect::<Vec<_>>(), times_s).into_iter();
+        spans.map(move |Mover { from_s, to_s, .. }| Disturbance { kind, from_s, to_s })
+    };
+    [DisturbanceKind::Camera, DisturbanceKind::Light]
+        .into_iter()
+        .flat_map(of_kind)
+        .collect()
 }
 
 #[cfg(test)]

@@ -202,7 +202,9 @@ fn check_summary(summary: &Summary, n_frames: usize) -> Result<(), Error> {
     require(is_size, "sprite_size_px of library.json")?;
     let stats = &summary.stats;
     let speeds = stats.speed_bl_per_s.into_iter().flatten();
-    let is_stats = lie(speeds.chain(stats.turn_rate_rad_per_s), &(0.0..=1e6))
+    let disturbed = stats.disturbances.iter();
+    let is_stats = lie(disturbed.flat_map(|d| [d.from_s, d.to_s]), &TIME_S)
+        && lie(speeds.chain(stats.turn_rate_rad_per_s), &(0.0..=1e6))
         && lie(stats.length_px, &LENGTH_PX)
         && lie([stats.component_share], &SHARE)
         && lie(stats.first_foreign_s, &TIME_S)

@@ -161,6 +161,7 @@ fn track(fish: &BentFish) -> Track {
     Track {
         frames,
         movers: Vec::new(),
+        disturbances: Vec::new(),
         scratch,
     }
 }

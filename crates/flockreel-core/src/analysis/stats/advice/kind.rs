@@ -1,7 +1,7 @@
 //! Every kind of advice, with its code and its sentence.
 
 use crate::geometry::Rect;
-use crate::library::{Mover, MoverKind, View};
+use crate::library::{Disturbance, DisturbanceKind, Mover, MoverKind, View};
 
 /// One deficiency of a library. The variants are in order of severity, the most severe first.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -38,6 +38,14 @@ pub enum Advice {
         n: usize,
         /// Time of the first, seconds.
         first_s: f64,
+    },
+    /// The camera shakes, its focus hunts, or the light is another one for a time.
+    #[error("{}", disturbance_sentence(*n, longest))]
+    Disturbed {
+        /// Number of such times, of one kind.
+        n: usize,
+        /// The longest of them.
+        longest: Disturbance,
     },
     /// The view was guessed with a probability below 0.9.
     #[error(
@@ -139,6 +147,10 @@ impl Advice {
             Advice::NeverLeaves => "never_leaves",
             Advice::OtherMovers { .. } => "other_movers",
             Advice::ForeignFrames { .. } => "foreign_frames",
+            Advice::Disturbed { longest, .. } => match longest.kind {
+                DisturbanceKind::Camera => "camera_unsteady",
+                DisturbanceKind::Light => "light_changes",
+            },
             Advice::ViewUnsure { .. } => "view_unsure",
             Advice::SeldomFound(_) => "seldom_found",
             Advice::OftenAtBorder(_) => "often_at_border",
@@ -202,6 +214,26 @@ fn other_view(view: View) -> &'static str {
 
 fn percent(share: &f64) -> String {
     format!("{:.0} %", 100.0 * share)
+}
+
+/// Returns the sentence about an unsteady camera or another light, with the time of one.
+fn disturbance_sentence(n: usize, &Disturbance { kind, from_s, to_s }: &Disturbance) -> String {
+    let (what, advice) = match kind {
+        DisturbanceKind::Camera => (
+            "the whole picture shakes or is out of focus",
+            "fix the camera and its focus, or measure a part without it",
+        ),
+        DisturbanceKind::Light => (
+            "the light is another one",
+            "film in steady light; a flock does not show the animal as it looks in a very different light",
+        ),
+    };
+    let times = match n {
+        1 => String::new(),
+        2 => ", and once more".to_string(),
+        n => format!(", and {} times more", n - 1),
+    };
+    format!("{what} from {from_s:.1} to {to_s:.1} s{times}: {advice}")
 }
 
 /// Returns the sentence about other moving objects, with the time and the box of one.

@@ -8,7 +8,7 @@
 
 use crate::analysis::Params;
 use crate::geometry::wrap_rad;
-use crate::library::{Library, Poses, View};
+use crate::library::{DisturbanceKind, Library, Poses, View};
 
 mod kind;
 
@@ -81,6 +81,14 @@ fn add_scene_advice(library: &Library, all: &mut Vec<Advice>) {
             n: stats.n_foreign_frames,
             first_s,
         });
+    }
+    for kind in [DisturbanceKind::Camera, DisturbanceKind::Light] {
+        let of_kind = || stats.disturbances.iter().filter(|d| d.kind == kind);
+        let longest = of_kind().max_by(|a, b| (a.to_s - a.from_s).total_cmp(&(b.to_s - b.from_s)));
+        all.extend(longest.map(|&longest| Advice::Disturbed {
+            n: of_kind().count(),
+            longest,
+        }));
     }
     let view_confidence = poses.view_confidence;
     if let Some(probability) = view_confidence.filter(|&p| p < MIN_VIEW_PROBABILITY) {
