@@ -4,7 +4,8 @@
 //! While the child computes, the worker sends a heartbeat every third of the lease, and up to twice per second if
 //! there is new progress.
 
-use std::pin::pin;
+use std::convert::Infallible;
+use std::sync::OnceLock;
 use std::time::Duration;
 
 use tokio::time::{Instant, MissedTickBehavior, interval};
@@ -114,23 +115,36 @@ impl Worker {
         listener: &Listener,
         work: impl Future<Output = Result<Outcome, Error>>,
     ) -> Result<Outcome, Error> {
-        let mut work = pin!(work);
+        let reason = OnceLock::new();
+        // Both go on while the other waits: the computation may hold the row of the job that a heartbeat changes.
+        let result = tokio::select! {
+            result = work => result,
+            never = self.watch(lease, listener, &reason) => match never {},
+        };
+        with_stop_reason(reason.into_inner(), result)
+    }
+
+    /// Renews the lease and stores progress for ever. Cancels the computation if it must stop, and stores the `reason`.
+    async fn watch(
+        &self,
+        lease: &Lease,
+        listener: &Listener,
+        reason: &OnceLock<Error>,
+    ) -> Infallible {
         let mut tick = interval(TICK.min(self.context.lease / 3));
         tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let (start, mut last_beat) = (Instant::now(), Instant::now());
         let mut stored_position = listener.position();
-        let mut reason = None;
         loop {
-            tokio::select! {
-                ended = &mut work => return with_stop_reason(reason, ended),
-                _ = tick.tick() => {}
-            }
-            if reason.is_none() {
+            tick.tick().await;
+            if reason.get().is_none() {
                 // A job that keeps parts has the time for each of them.
                 let since = listener.advanced_at().map_or(start, Instant::from_std);
-                reason = self.reason_to_stop(lease, since).await;
+                if let Some(found) = self.reason_to_stop(lease, since).await {
+                    reason.get_or_init(|| found);
+                }
             }
-            if reason.is_some() || self.context.draining.is_cancelled() {
+            if reason.get().is_some() || self.context.draining.is_cancelled() {
                 listener.cancel();
             }
             let position = listener.position();

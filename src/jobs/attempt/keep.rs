@@ -71,13 +71,7 @@ impl PartStore<'_> {
         let files: Vec<BlobFile> = files.into_iter().map(Into::into).collect();
         let draft = self.draft.part(&name_of(number));
         store.blobs().adopt(draft, &part.folder).await?;
-        // In a task of its own, because the worker renews the lease, which changes the same row, while it does not wait for
-        // this.
-        let stored = tokio::spawn({
-            let (store, lease, part) = (store.clone(), lease.clone(), part.clone());
-            async move { store.keep(&lease, &part, &files).await }
-        });
-        match stored.await.map_err(std::io::Error::other)? {
+        match store.keep(lease, &part, &files).await {
             Ok(Change::Made) => listener.note_advance(),
             Ok(Change::Lost) => {
                 store.blobs().discard(&part.folder).await?;

@@ -114,18 +114,15 @@ fn analyze_part(
     let backgrounds = scene.backgrounds.iter();
     let lights: Vec<usize> = backgrounds.map(|background| background.light).collect();
     let background = scene.backgrounds.swap_remove(0);
-    let occluders = if scene.is_masked {
-        None
-    } else {
-        occluders::remove(&mut track, &background, progress)?
-    };
+    let remove_occluders = || occluders::remove(&mut track, &background, progress);
+    let occluders = (!scene.is_masked).then(remove_occluders).transpose()?;
+    let occluders = occluders.flatten();
     let (view, view_confidence) = pose::view(&track.frames, params);
     let animal_too_small =
         params.sprites == CutSprites::Auto && sprite::is_too_small(&track.frames);
     let mut poses = pose::measure(&track.frames, view, &source.format(), params);
     poses.view_confidence = view_confidence;
     poses.other_movers = std::mem::take(&mut track.movers);
-    let disturbances = std::mem::take(&mut track.disturbances);
     midline::trace(&mut poses, &track);
     poses.tail_beat = midline::tail_beat::measure(&poses);
     let sprites = if animal_too_small {
@@ -140,7 +137,7 @@ fn analyze_part(
         .then(|| stats::length_px(&poses))
         .flatten();
     let shadow = length_px.and_then(|px| shadow::measure(&track, &background.rgb, px));
-    let foreign_times_s = track.foreign_times_s();
+    let (foreign_times_s, disturbances) = (track.foreign_times_s(), track.disturbances.clone());
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
     let stats = LibraryStats {

@@ -197,7 +197,7 @@ mod tests {
     fn only_another_light_differs_all_over() {
         let mut scene = Frame::new(320, 240, ColorSpec::default());
         for (at, value) in scene.planes[..320 * 240].iter_mut().enumerate() {
-            *value = if (at % 320 / 40 + at / 320 / 40) % 2 == 0 {
+            *value = if (at % 320 / 40 + at / 320 / 40).is_multiple_of(2) {
                 60
             } else {
                 160

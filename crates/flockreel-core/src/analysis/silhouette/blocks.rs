@@ -275,7 +275,13 @@ mod tests {
     #[test]
     fn edges_of_a_moved_picture_differ() {
         let [mut background, mut moved] = [0, 1].map(|_| Frame::new(64, 48, ColorSpec::default()));
-        let tile = |x: usize, y: usize| if (x / 16 + y / 12) % 2 == 0 { 60 } else { 180 };
+        let tile = |x: usize, y: usize| {
+            if (x / 16 + y / 12).is_multiple_of(2) {
+                60
+            } else {
+                180
+            }
+        };
         for (at, (still, moved)) in background.planes[..64 * 48]
             .iter_mut()
             .zip(&mut moved.planes[..64 * 48])
