@@ -4,7 +4,6 @@
 pub mod atlas;
 pub mod csv;
 pub mod distance_map;
-mod disturbance;
 pub mod evidence;
 pub mod fish_json;
 pub mod flock_json;

@@ -5,7 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::disturbance::DisturbanceFile;
+mod disturbance;
+
+use self::disturbance::DisturbanceFile;
 use crate::analysis::Params;
 use crate::analysis::stats::{Advice, advice};
 use crate::geometry::rounded;
