@@ -28,10 +28,10 @@ const RECURRENCE: f64 = 0.1;
 const CLUSTER_REACH: u32 = 5;
 /// Largest number of clusters that are cut. Free choice: it bounds the time.
 const MAX_CLUSTERS: usize = 4;
-/// Least share of the samples with a body in which the animal touches it, and in which it does so at one place,
-/// 0..=1. Free choice.
+/// Least share of the samples with a body in which the animal touches it, and of their successive pairs in which it
+/// does so at one place, 0..=1. Free choice.
 const MIN_TOUCHING_SHARE: f64 = 0.95;
-const MIN_ANCHORED_SHARE: f64 = 0.6;
+const MIN_STEADY_SHARE: f64 = 0.8;
 
 /// A part of the animal in the background.
 pub(super) struct StillPart {
@@ -128,7 +128,8 @@ impl Marks {
     }
 }
 
-/// Returns whether the animal touches a body in nearly all samples that show it, mostly at one place.
+/// Returns whether the animal touches a body in nearly all samples that show it, at a place that stays or wanders
+/// slowly, as the end of a worm does.
 fn is_touched(body: &Mask, marks: &[&Marks], grid: &Grid) -> bool {
     let is_there = |marks: &&&Marks| 2 * n_common(body, &marks.differing) <= body.area();
     let contacts: Vec<Vec<usize>> = (marks.iter().filter(is_there))
@@ -147,15 +148,10 @@ fn is_touched(body: &Mask, marks: &[&Marks], grid: &Grid) -> bool {
         })
         .collect();
     let n_touching = contacts.iter().filter(|cells| !cells.is_empty()).count() as f64;
-    let n_anchored = grid
-        .count_near(contacts.iter())
-        .into_iter()
-        .max()
-        .unwrap_or(0);
+    let is_steady = |pair: &&[Vec<usize>]| grid.count_near(pair.iter()).contains(&2);
+    let n_steady = contacts.windows(2).filter(is_steady).count() as f64;
     let n = contacts.len() as f64;
-    n > 0.0
-        && n_touching >= MIN_TOUCHING_SHARE * n
-        && f64::from(n_anchored) >= MIN_ANCHORED_SHARE * n
+    n > 1.0 && n_touching >= MIN_TOUCHING_SHARE * n && n_steady >= MIN_STEADY_SHARE * (n - 1.0)
 }
 
 /// Returns the number of cells of a body that are set in a mask.
