@@ -16,7 +16,14 @@ fn measured(name: &str, film: &Staged) -> flockreel_core::library::Library {
 #[test]
 fn dimmed_switched_and_flickering_light_is_corrected() {
     let dimmed = |k: usize, _| 1.0 - 0.5 * (k as f64 / 75.0 - 0.5).clamp(0.0, 1.0);
-    measured("dimmed", &Staged::plain().with_light(dimmed));
+    let library = measured("dimmed", &Staged::plain().with_light(dimmed));
+    let told = &library.stats.disturbances;
+    let until = disturbance(DisturbanceKind::Light, 0, N_FRAMES - 1).to_s;
+    assert!(
+        told.iter()
+            .any(|one| one.kind == DisturbanceKind::Light && one.to_s == until),
+        "{told:?}"
+    );
     let switched = |k: usize, _| if (50..110).contains(&k) { 0.4 } else { 1.0 };
     let library = measured("switched", &Staged::plain().with_light(switched));
     let other = disturbance(DisturbanceKind::Light, 50, 109);

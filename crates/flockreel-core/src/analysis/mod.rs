@@ -30,8 +30,11 @@ pub use error::{Error, Evidence};
 pub use params::Params;
 use params::{CutSprites, ScaleMode};
 use pose::{midline, sprite};
+use scene::Scene;
+use scene::background::Background;
 use scene::preview::Preview;
 use similarity::transition;
+use track::Track;
 
 use std::sync::Arc;
 
@@ -114,9 +117,11 @@ fn analyze_part(
     let backgrounds = scene.backgrounds.iter();
     let lights: Vec<usize> = backgrounds.map(|background| background.light).collect();
     let background = scene.backgrounds.swap_remove(0);
-    let remove_occluders = || occluders::remove(&mut track, &background, progress);
-    let occluders = (!scene.is_masked).then(remove_occluders).transpose()?;
-    let occluders = occluders.flatten();
+    let occluders = if scene.is_masked {
+        None
+    } else {
+        occluders::remove(&mut track, &background, progress)?
+    };
     let (view, view_confidence) = pose::view(&track.frames, params);
     let animal_too_small =
         params.sprites == CutSprites::Auto && sprite::is_too_small(&track.frames);
@@ -137,18 +142,12 @@ fn analyze_part(
         .then(|| stats::length_px(&poses))
         .flatten();
     let shadow = length_px.and_then(|px| shadow::measure(&track, &background.rgb, px));
-    let (foreign_times_s, disturbances) = (track.foreign_times_s(), track.disturbances.clone());
+    let of_scene = scene_stats(&scene, &background, &track);
     drop(track);
     let connections = transition::connect(&sprites, &poses, params, cpu, progress)?;
     let stats = LibraryStats {
-        never_seen_px: background.never_seen_px,
-        still_px: scene.still_px,
-        several_animals: scene.several_animals,
-        n_foreign_frames: foreign_times_s.len(),
-        first_foreign_s: foreign_times_s.first().copied(),
-        disturbances,
         animal_too_small,
-        ..stats::library_stats(&poses, &connections)
+        ..stats::library_stats(&poses, &connections, of_scene)
     };
     Ok(Library {
         poses,
@@ -164,4 +163,18 @@ fn analyze_part(
         patches: connections.patches,
         stats,
     })
+}
+
+/// Returns the statistics of the scene; the others are zero.
+fn scene_stats(scene: &Scene, background: &Background, track: &Track) -> LibraryStats {
+    let foreign_times_s = track.foreign_times_s();
+    LibraryStats {
+        never_seen_px: background.never_seen_px,
+        still_px: scene.still_px,
+        several_animals: scene.several_animals,
+        n_foreign_frames: foreign_times_s.len(),
+        first_foreign_s: foreign_times_s.first().copied(),
+        disturbances: track.disturbances.clone(),
+        ..LibraryStats::default()
+    }
 }

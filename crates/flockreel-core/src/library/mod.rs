@@ -114,10 +114,10 @@ pub enum MoverKind {
     Other,
 }
 
-/// A time in which the whole picture does not show the scene as it does in most frames.
+/// A time in which the whole picture differs from the background: the camera or the light has changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disturbance {
-    /// What changes the picture.
+    /// Cause.
     pub kind: DisturbanceKind,
     /// Time at which it begins, seconds.
     pub from_s: f64,
@@ -125,12 +125,12 @@ pub struct Disturbance {
     pub to_s: f64,
 }
 
-/// What changes the whole picture for a time.
+/// Cause of a difference of the whole picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DisturbanceKind {
     /// The camera shakes, or its focus hunts.
     Camera,
-    /// The light is another one.
+    /// The light has another brightness or color.
     Light,
 }
 
@@ -154,7 +154,7 @@ pub struct LibraryStats {
     pub n_foreign_frames: usize,
     /// Time of the first such frame, seconds; null if there is none.
     pub first_foreign_s: Option<f64>,
-    /// Times in which the camera shakes, or the light is another one; in order of time for each kind.
+    /// Times in which the camera shakes, its focus hunts, or the light differs; in order of time for each kind.
     pub disturbances: Vec<Disturbance>,
     /// Whether the animal covers too few pixels for sprites. The library then holds poses only.
     pub animal_too_small: bool,

@@ -50,8 +50,7 @@ use survey::Survey;
 /// Largest share of blocks that may differ where a frame shows a background's scene, and of the background's edges
 /// where the camera is steady, 0..=1. Free choice.
 const MAX_DIFFERING_SHARE: f64 = 0.5;
-/// Deviation of a frame's gain from 1 above which its light is told as another one. Free choice: automatic exposure
-/// stays below it.
+/// Difference between a frame's gain and 1 above which its light is reported. Free choice.
 const OTHER_LIGHT: f32 = 0.2;
 /// Number of times that still parts of the animal are taken out of the backgrounds. Free choice: it bounds the
 /// time.
@@ -96,7 +95,7 @@ pub struct Placed<'a> {
     pub light: Light,
     /// Boxes of the picture that may differ from the background.
     pub boxes: Vec<Rect>,
-    /// What keeps the frame from showing the scene as most frames do.
+    /// Difference of the whole frame from the background, caused by camera or light.
     pub disturbance: Option<DisturbanceKind>,
 }
 

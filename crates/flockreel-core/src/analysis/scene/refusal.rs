@@ -39,13 +39,6 @@ pub(super) enum SimilarObjects {
     Animals,
 }
 
-/// Returns whether two frames differ in most of the picture. Only another light changes the still parts too.
-fn differs_all_over(a: &Frame, b: &Frame) -> bool {
-    let [a, b] = [a, b].map(Thumbnail::new);
-    let n_differing = (0..a.len()).filter(|&cell| a.differs_at(&b, cell)).count();
-    2 * n_differing > a.len()
-}
-
 /// Checks footage by the survey of its samples; fails with the reason to refuse it. Returns the objects that
 /// resemble the animal. With masks of the animal, the scene may move.
 pub(super) fn check(
@@ -113,6 +106,13 @@ fn check_scene(survey: &Survey, samples: &Samples, subject: &Subject) -> Result<
         });
     }
     Ok(())
+}
+
+/// Returns whether two frames differ in most of the picture. Only another light changes the still parts too.
+fn differs_all_over(a: &Frame, b: &Frame) -> bool {
+    let [a, b] = [a, b].map(Thumbnail::new);
+    let n_differing = (0..a.len()).filter(|&cell| a.differs_at(&b, cell)).count();
+    2 * n_differing > a.len()
 }
 
 /// Returns the objects that resemble the animal. Fails if they are animals and the parameters do not say

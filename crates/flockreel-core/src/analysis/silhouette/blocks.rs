@@ -27,6 +27,8 @@ pub struct Blocks {
     black: f32,
     sums: Vec<[i16; 3]>,
     thresholds: Vec<[i16; 3]>,
+    /// Blocks with an upright edge, and with a level one: they would differ in a picture moved by one block.
+    edges: [Vec<usize>; 2],
 }
 
 /// The parts of a frame that differ from the background.
@@ -36,7 +38,7 @@ pub struct Proposals {
     pub boxes: Vec<Rect>,
     /// Share of all blocks that differ, 0..=1.
     pub share: f64,
-    /// Share of the blocks with an edge of the background that differ, 0..=1.
+    /// Share of the background's edges that differ, 0..=1; 0 before `measure_noise`.
     pub edge_share: f64,
 }
 
@@ -61,10 +63,11 @@ impl Blocks {
             black,
             sums,
             thresholds,
+            edges: [Vec::new(), Vec::new()],
         }
     }
 
-    /// Raises each block's thresholds to four times its noise.
+    /// Raises each block's thresholds to four times its noise, and finds the edges that stand out from it.
     ///
     /// The noise is 1.4826 times the median absolute deviation from the background, over the samples in which
     /// nothing covers the block. `group` selects the samples, one bit each. `taken` has one word per block:
@@ -105,6 +108,11 @@ impl Blocks {
                     }
                 }
             });
+        let (columns, last_row) = (self.columns, self.sums.len() - self.columns);
+        self.edges = [
+            self.edges(1, |at| (at + 1) % columns > 0),
+            self.edges(columns, |at| at < last_row),
+        ];
     }
 
     /// Returns the parts of a frame that need a comparison pixel by pixel.
@@ -121,23 +129,23 @@ impl Blocks {
         }
     }
 
-    /// Returns the share of the background's edges that differ, 0..=1: the larger one of upright and level edges. An
-    /// edge lies where a picture moved by one block would differ. Edges shorter together than the picture do not
-    /// count, because the animal alone could cover them.
+    /// Returns the share of the background's edges that differ, 0..=1: the larger one of upright and level edges.
+    /// Edges that together are shorter than the picture do not count, because the animal alone could cover them.
     fn edge_share(&self, differing: &Mask) -> f64 {
-        let last_row = self.sums.len() - self.columns;
-        let share = |step: usize, least: usize, has_next: &dyn Fn(usize) -> bool| {
-            let is_edge = |&at: &usize| {
-                let gap = |next: usize| (self.sums[next][0] - self.sums[at][0]).abs();
-                has_next(at) && gap(at + step) > self.thresholds[at][0]
-            };
-            let edges: Vec<usize> = (0..self.sums.len()).filter(is_edge).collect();
+        let share = |edges: &[usize], least: usize| {
             let n_differing = edges.iter().filter(|&&at| differing.bits[at] > 0).count();
             n_differing as f64 / edges.len().max(least) as f64
         };
-        let upright = share(1, self.rows, &|at| (at + 1) % self.columns > 0);
-        let level = share(self.columns, self.columns, &|at| at < last_row);
-        upright.max(level)
+        let [upright, level] = &self.edges;
+        share(upright, self.rows).max(share(level, self.columns))
+    }
+
+    /// Returns the blocks whose luma differs from that of the block `step` blocks further, as far as `has_next` says
+    /// that there is one.
+    fn edges(&self, step: usize, has_next: impl Fn(usize) -> bool) -> Vec<usize> {
+        let gap = |at: usize| (self.sums[at + step][0] - self.sums[at][0]).abs();
+        let all = (0..self.sums.len()).filter(|&at| has_next(at));
+        all.filter(|&at| gap(at) > self.thresholds[at][0]).collect()
     }
 
     /// Returns the mask of the differing blocks, in units of blocks.
@@ -289,7 +297,8 @@ mod tests {
         {
             (*still, *moved) = (tile(at % 64, at / 64), tile(at % 64 + 4, at / 64));
         }
-        let blocks = Blocks::new(&background);
+        let mut blocks = Blocks::new(&background);
+        blocks.measure_noise(&[background.clone()], 1, &[0; 16 * 12]);
         let share_of = |frame: &Frame| blocks.proposals(frame, &Light::NEUTRAL, 0).edge_share;
         assert_eq!(share_of(&moved), 1.0);
         let mut covered = background.clone();

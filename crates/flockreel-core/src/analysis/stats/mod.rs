@@ -16,8 +16,13 @@ use crate::order::percentile;
 /// Number of bins in the heading histogram: 10 degrees each, starting at -180.
 const N_BINS: usize = 36;
 
-/// Returns the statistics of a library. The caller adds the values about the scene and the sprites.
-pub(super) fn library_stats(poses: &Poses, connections: &Connections) -> LibraryStats {
+/// Returns the statistics of a library, from those of its scene (`of_scene`). The caller adds the values about the
+/// sprites.
+pub(super) fn library_stats(
+    poses: &Poses,
+    connections: &Connections,
+    of_scene: LibraryStats,
+) -> LibraryStats {
     let component = &connections.playback.component;
     let length_px = length_px(poses);
     LibraryStats {
@@ -31,7 +36,7 @@ pub(super) fn library_stats(poses: &Poses, connections: &Connections) -> Library
         speed_bl_per_s: length_px.and_then(|length| speeds(poses, length)),
         turn_rate_rad_per_s: turn_rate(poses),
         length_px,
-        ..LibraryStats::default()
+        ..of_scene
     }
 }
 

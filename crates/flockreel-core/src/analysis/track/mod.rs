@@ -73,7 +73,7 @@ pub struct Track {
     pub frames: Vec<Tracked>,
     /// Things other than the animal that moved.
     pub movers: Vec<Mover>,
-    /// Times in which the camera shakes, or the light is another one.
+    /// Times in which the camera shakes, its focus hunts, or the light differs.
     pub disturbances: Vec<Disturbance>,
     /// Storage of the mattes' pixels.
     pub scratch: Arc<dyn Scratch>,

@@ -138,29 +138,26 @@ pub(super) fn gather(frames: &[Vec<MoverSighting>], times_s: &[f64]) -> Vec<Move
     movers
 }
 
-/// Returns the times of another light or an unsteady camera, from that of each frame. They last as long as movers.
+/// Returns the times in which frames are disturbed, by the kind of each frame. Gaps and durations are those of movers.
 pub(super) fn disturbances(
     frames: &[Option<DisturbanceKind>],
     times_s: &[f64],
 ) -> Vec<Disturbance> {
-    let whole = MoverSighting {
-        box_px: Rect::of_size(1, 1),
-        on_border: false,
-        is_like_animal: false,
-        is_image: false,
-    };
     let of_kind = |kind: DisturbanceKind| {
-        let seen = frames.iter().map(|&frame| match frame == Some(kind) {
-            true => vec![whole.clone()],
-            false => Vec::new(),
-        });
-        let spans = gather(&seen.collect::<Vec<_>>(), times_s).into_iter();
-        spans.map(move |Mover { from_s, to_s, .. }| Disturbance { kind, from_s, to_s })
+        let frames = frames.iter().zip(times_s);
+        let times: Vec<f64> = frames
+            .filter(|(frame, _)| **frame == Some(kind))
+            .map(|(_, &time_s)| time_s)
+            .collect();
+        let spans = times.chunk_by(|a, b| b - a <= MAX_GAP_S);
+        let told = spans.map(|span| (span.len(), span[0], span[span.len() - 1]));
+        told.filter(|&(n, from_s, to_s)| n >= MIN_SIGHTINGS && to_s - from_s >= MIN_DURATION_S)
+            .map(|(_, from_s, to_s)| Disturbance { kind, from_s, to_s })
+            .collect::<Vec<_>>()
     };
     [DisturbanceKind::Camera, DisturbanceKind::Light]
-        .into_iter()
-        .flat_map(of_kind)
-        .collect()
+        .map(of_kind)
+        .concat()
 }
 
 #[cfg(test)]

@@ -39,7 +39,7 @@ pub enum Advice {
         /// Time of the first, seconds.
         first_s: f64,
     },
-    /// The camera shakes, its focus hunts, or the light is another one for a time.
+    /// For a time the camera shakes, its focus hunts, or the light differs from that of the other frames.
     #[error("{}", disturbance_sentence(*n, longest))]
     Disturbed {
         /// Number of such times, of one kind.
@@ -224,7 +224,7 @@ fn disturbance_sentence(n: usize, &Disturbance { kind, from_s, to_s }: &Disturba
             "fix the camera and its focus, or measure a part without it",
         ),
         DisturbanceKind::Light => (
-            "the light is another one",
+            "the light differs from that of the rest of the film",
             "film in steady light; a flock does not show the animal as it looks in a very different light",
         ),
     };

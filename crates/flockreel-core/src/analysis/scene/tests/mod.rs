@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+mod still_parts;
+
 use crate::analysis::params::{AnimalAtParam, CutSprites, Follow};
 use crate::analysis::{Error, Params, analyze, preview};
 use crate::code::Code;
@@ -31,6 +33,8 @@ struct Picture {
     camera_px: [f64; 2],
     /// Brightness of the light as a factor; 1 is normal.
     light: f64,
+    /// Blue in the light, levels of U above gray.
+    blue: u8,
     discs: Vec<Disc>,
     /// From the discs to the hard shadows that they cast on the wall, pixels.
     shadows_px: Option<[f64; 2]>,
@@ -41,6 +45,7 @@ impl Picture {
         Picture {
             camera_px: [0.0; 2],
             light: 1.0,
+            blue: 0,
             discs,
             shadows_px: None,
         }
@@ -92,6 +97,8 @@ impl<F: Fn(usize) -> Picture> FrameStream for Reel<'_, F> {
 fn drawn(picture: &Picture, noise_key: u64) -> Frame {
     let mut frame = Frame::new(WIDTH, HEIGHT, ColorSpec::default());
     frame.planes.fill(128);
+    let u = (WIDTH * HEIGHT) as usize..(WIDTH * HEIGHT * 5 / 4) as usize;
+    frame.planes[u].fill(128 + picture.blue);
     let stone = |x: i64, y: i64| 130.0 + 60.0 * random::uniform(6, &[x as u64, y as u64]);
     let wall = |x: f64, y: f64| {
         let (x, y) = (x / 6.0 + 1000.0, y / 6.0 + 1000.0);
@@ -195,6 +202,16 @@ fn changing_light_is_accepted() {
 }
 
 #[test]
+fn light_that_turns_blue_again_and_again_is_named() {
+    let (code, sentence) = refusal(90, |k| Picture {
+        blue: if k / 20 % 2 == 1 { 13 } else { 0 },
+        ..Picture::with_discs(vec![swimmer(k, 0.0, 9.0)])
+    });
+    assert_eq!(code, Code::LightChanges, "{sentence}");
+    assert!(sentence.contains("from 0.7 s on"), "{sentence}");
+}
+
+#[test]
 fn object_that_blinks_at_one_place_is_no_second_animal() {
     let blinking = Disc {
         center_px: [160.0, 20.0],
@@ -268,77 +285,6 @@ fn film_of_a_few_frames_is_refused() {
         sentence,
         "the footage has 12 frames to measure, but at least 16 are needed"
     );
-}
-
-/// Returns a fish that holds its place: a body of discs that never moves, and a tail that beats.
-fn station_holder(frame_idx: usize) -> Vec<Disc> {
-    let sway = libm::sin(0.7 * frame_idx as f64);
-    let along = |at: usize| {
-        let behind = at.saturating_sub(8) as f64;
-        Disc {
-            center_px: [50.0 + 4.0 * at as f64, 72.0 + 0.35 * behind * behind * sway],
-            radius_px: 9.0 - 0.4 * at as f64,
-        }
-    };
-    (0..17).map(along).collect()
-}
-
-/// Returns the number of pixels inside discs, and the mean of their centers.
-fn covered(discs: &[Disc]) -> (f64, [f64; 2]) {
-    let (mut n, mut sum) = (0.0, [0.0; 2]);
-    for at in 0..WIDTH * HEIGHT {
-        let [x, y] = [at % WIDTH, at / WIDTH].map(|v| f64::from(v) + 0.5);
-        let inside = |d: &Disc| libm::hypot(x - d.center_px[0], y - d.center_px[1]) < d.radius_px;
-        if discs.iter().any(inside) {
-            n += 1.0;
-            sum = [sum[0] + x, sum[1] + y];
-        }
-    }
-    (n, sum.map(|v| v / n))
-}
-
-#[test]
-fn animal_that_never_leaves_its_place_is_seen_whole() {
-    let library = analyzed(60, &Params::default(), |k| {
-        Picture::with_discs(station_holder(k))
-    });
-    let library = library.expect("the tail moves");
-    for (k, pose) in library.poses.frames.iter().enumerate() {
-        let (area_px, [x, y]) = covered(&station_holder(k));
-        let found = pose.centroid_px.expect("the animal is found");
-        let off_px = libm::hypot(found[0] - x, found[1] - y);
-        let share = pose.area_px.expect("it has an area") / area_px;
-        assert!(
-            off_px < 3.0 && (0.9..1.1).contains(&share),
-            "frame {k}: {off_px} px, {share}"
-        );
-        assert!(
-            pose.confidence < Some(0.9),
-            "the floor under the body is invented"
-        );
-    }
-    let advice = crate::analysis::stats::advice(&library, &Params::default());
-    assert!(advice.iter().any(|one| one.code() == "never_leaves"));
-}
-
-#[test]
-fn rock_of_the_animals_color_that_it_often_touches_is_no_part_of_it() {
-    let rock = Disc {
-        center_px: [96.0, 115.0],
-        radius_px: 24.0,
-    };
-    let visitor = |k: usize| {
-        let [aside, above] = [0.9, 0.2].map(|rate| libm::sin(rate * k as f64));
-        Disc {
-            center_px: [96.0 + 8.0 * aside, 87.0 - 60.0 * above * above],
-            radius_px: 9.0,
-        }
-    };
-    let library = analyzed(60, &Params::default(), |k| {
-        Picture::with_discs(vec![visitor(k), rock])
-    });
-    let library = library.expect("one animal moves");
-    assert_eq!(library.stats.still_px, 0);
 }
 
 #[test]
